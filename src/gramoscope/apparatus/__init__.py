@@ -1,0 +1,1 @@
+"""The parts bolted together, and a capture on disk."""

@@ -1,0 +1,1 @@
+"""The film: pixels, noise, frames on disk."""

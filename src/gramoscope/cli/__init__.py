@@ -1,0 +1,1 @@
+"""The commands. No signal processing in here."""

@@ -1,0 +1,1 @@
+"""The record: groove geometry, how sound is cut into it, recording characteristics, texture, damage."""

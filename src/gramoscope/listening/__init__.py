@@ -1,0 +1,1 @@
+"""The loudspeaker and the ear: sound files, comparison, pictures."""

@@ -1,0 +1,1 @@
+"""Optical flow: how the texture moved from frame to frame."""

@@ -1,0 +1,1 @@
+"""The phono preamp: place to time, and the recording characteristic undone."""

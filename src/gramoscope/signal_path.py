@@ -1,0 +1,171 @@
+"""The types that pass along the player, in playing order. Read this first.
+
+    capture on disk
+      │ apparatus.capture          lazy; one stretch in memory at a time
+    FrameGroup                     the film of one stretch of groove
+      │ pickup                     flow → focus → stripes → where each wall runs
+    WallTrace                      both walls of one stretch, with error bars
+      │ tonearm                    splice → smooth
+    GrooveMotion                   the groove's velocity along the whole passage, piece by piece
+      │ preamp                     place → time, resample, recording characteristic
+    Audio                          sound, piece by piece
+      │ listening                  files, comparison, figures, report
+
+Each is a frozen record of arrays. A part reads one and returns the next; nobody changes one in place. From the pickup on
+every sample carries its standard error (`…_sigma`, one standard deviation, NaN where unknown) and its flags
+(`gramoscope.quality`), so that a filled gap never passes for a measurement. SI units inside.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from gramoscope.conventions import FloatArray
+from gramoscope.quality import FlagArray
+
+ImageArray = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
+
+
+@dataclass(frozen=True, eq=False)
+class FrameGroup:
+    """The film of one stretch of groove: a few frames taken a small step apart.
+
+    Attributes
+    ----------
+    number : int
+        Which group of the capture this is, from 0.
+    images : uint8 or uint16 array, shape (frame, row, column)
+        Grey, canonical (see `gramoscope.conventions`): s grows with the column, l with the row. A frame that could not
+        be read is all zeros and not `valid`.
+    arc_start_m : float64 array, shape (frame,)
+        Nominal place s of column 0 in each frame: what the encoder or the manifest says. The pictures know better.
+    stage_m : float64 array, shape (frame,)
+        Radial position of the microscope, positive inwards; 0 when it did not move.
+    pixel_pitch_m : float
+        One pixel, measured on the record.
+    white_level : int
+        The pixel value of full scale, 2**bits − 1.
+    valid : bool array, shape (frame,)
+        Whether each frame was read.
+    problems : tuple of str
+        What was found wrong while reading, in words, empty when all is well.
+    """
+
+    number: int
+    images: ImageArray
+    arc_start_m: FloatArray
+    stage_m: FloatArray
+    pixel_pitch_m: float
+    white_level: int
+    valid: npt.NDArray[np.bool_]
+    problems: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class WallTrace:
+    """Where both walls of one stretch run.
+
+    Attributes
+    ----------
+    number : int
+        The group it was read from.
+    arc_start_m : float
+        Nominal place s of the first sample.
+    arc_step_m : float
+        From one sample to the next; equal for all samples of a passage.
+    offset_m, offset_sigma_m : float64 arrays, shape (2, sample)
+        Lateral place of each wall (`INNER`, `OUTER`), up to a constant of that wall, and its standard error. NaN for a
+        wall that the pickup does not read.
+    slope, slope_sigma : float64 arrays, shape (2, sample)
+        d(offset)/ds, dimensionless, and its standard error. Times the groove speed it is the velocity of the wall.
+    correlation_samples : float
+        How many neighbouring samples share one error: the information of n samples is n / `correlation_samples` times
+        that of one. 1 when errors are independent.
+    flags : uint16 array, shape (2, sample)
+    head, tail : float32 arrays, shape (stripe, row, column), or None
+        The texture along the stripes at the start and the end of the stretch, by which the tonearm finds out how far
+        the record really turned from one stretch to the next; column 0 lies at `arc_start_m` + `head_offset_m` or
+        + `tail_offset_m`, and columns are one pixel apart.
+    head_offset_m, tail_offset_m : float
+    texture_pitch_m : float
+        From one column of `head` and `tail` to the next.
+    frame_step_m : float64 array, shape (frame − 1,)
+        How far the record really turned from frame to frame, by the flow; NaN where it could not be seen.
+    noise_share : float
+        Standard deviation of the camera noise over that of the texture in focus; NaN when unknown.
+    problems : tuple of str
+    """
+
+    number: int
+    arc_start_m: float
+    arc_step_m: float
+    offset_m: FloatArray
+    offset_sigma_m: FloatArray
+    slope: FloatArray
+    slope_sigma: FloatArray
+    correlation_samples: float
+    flags: FlagArray
+    head: npt.NDArray[np.float32] | None = None
+    tail: npt.NDArray[np.float32] | None = None
+    head_offset_m: float = 0.0
+    tail_offset_m: float = 0.0
+    texture_pitch_m: float = float("nan")
+    frame_step_m: FloatArray = field(default_factory=lambda: np.empty(0))
+    noise_share: float = float("nan")
+    problems: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class GrooveMotion:
+    """A piece of the groove's motion; pieces follow each other without gap or overlap.
+
+    Attributes
+    ----------
+    arc_start_m : float
+        Place s of the first sample.
+    arc_step_m : float
+        From one sample to the next.
+    lateral_velocity_m_s, lateral_sigma_m_s : float64 arrays, shape (sample,)
+        Velocity of the groove towards +l at nominal speed, and its standard error; NaN when the cut cannot be read from
+        the walls that were seen.
+    vertical_velocity_m_s, vertical_sigma_m_s : float64 arrays, shape (sample,)
+        The same towards +z.
+    flags : uint16 array, shape (sample,)
+    """
+
+    arc_start_m: float
+    arc_step_m: float
+    lateral_velocity_m_s: FloatArray
+    lateral_sigma_m_s: FloatArray
+    vertical_velocity_m_s: FloatArray
+    vertical_sigma_m_s: FloatArray
+    flags: FlagArray
+
+
+@dataclass(frozen=True, eq=False)
+class Audio:
+    """A piece of sound; pieces follow each other without gap or overlap.
+
+    Attributes
+    ----------
+    start_sample : int
+        Number of the first sample; sample 0 is s = 0.
+    rate_hz : float
+    samples : float64 array, shape (sample,)
+        Velocity of the groove in the direction of the cut, in metres a second.
+    sigma : float64 array, shape (sample,)
+        Standard error of each sample, same unit.
+    flags : uint16 array, shape (sample,)
+    history : tuple of str
+        What was done to it since the groove, in order.
+    """
+
+    start_sample: int
+    rate_hz: float
+    samples: FloatArray
+    sigma: FloatArray
+    flags: FlagArray
+    history: tuple[str, ...] = ()

@@ -1,0 +1,1 @@
+"""The platter: angle, radius and time; groove speed."""
