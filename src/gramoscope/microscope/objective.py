@@ -43,7 +43,7 @@ class Objective:
 
     @property
     def focal_length_m(self) -> float:
-        """f = 1/(1/u + 1/v), the thin lens equation (paper, section 3)."""
+        """F = 1/(1/u + 1/v), the thin lens equation (paper, section 3)."""
         return 1 / (1 / self.tube_length_m + 1 / self.object_distance_m)
 
     @property
