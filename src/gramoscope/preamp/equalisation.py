@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
-from gramoscope.conventions import FloatArray
-from gramoscope.disc.characteristic_filter import CharacteristicFilter, playback_filter
+from gramoscope.disc.characteristic_filter import playback_filter
 from gramoscope.disc.characteristics import RIAA, Characteristic
-from gramoscope.errors import require
-from gramoscope.quality import FlagArray, Quality
+from gramoscope.preamp.pieces import in_order, without_nan
+from gramoscope.quality import no_flags
 from gramoscope.signal_path import Audio
 
 
@@ -54,58 +54,46 @@ class Equaliser:
         ArgumentError
             If a piece does not follow the one before it, or has another rate.
         """
-        late: _Late | None = None
-        for piece in pieces:
-            if late is None:
-                late = _Late(self.characteristic, piece)
-            out = late.advance(piece)
-            if out.samples.size:
-                yield out
-        if late is not None:
-            out = late.flush()
-            if out.samples.size:
-                yield out
+        pieces = in_order(pieces)
+        first = next(pieces, None)
+        if first is None:
+            return
+        undo = playback_filter(self.characteristic, rate_hz=first.rate_hz)
+        done = (*first.history, history_line(self.characteristic))
+        waiting = replace(_part_of(first, 0, 0), history=done)
+        state, late_by = undo.at_rest(), undo.look_ahead
+        for piece in chain([first], pieces, [_silence(undo.look_ahead, after=first)]):
+            late, state = undo.advance(without_nan(piece).samples, state)
+            samples = late[late_by:]
+            late_by -= late.size - samples.size
+            waiting = _behind(waiting, replace(without_nan(piece), sigma=piece.sigma * undo.rms_gain))
+            if samples.size:
+                yield replace(_part_of(waiting, 0, samples.size), samples=samples)
+            waiting = _part_of(waiting, samples.size, None)
 
 
-class _Late:
-    """What waits for the filter's look-ahead: local to one run of `Equaliser.equalise`."""
+def _part_of(piece: Audio, start: int, stop: int | None) -> Audio:
+    part = slice(start, stop)
+    return replace(
+        piece,
+        start_sample=piece.start_sample + start,
+        samples=piece.samples[part],
+        sigma=piece.sigma[part],
+        flags=piece.flags[part],
+    )
 
-    def __init__(self, characteristic: Characteristic, first: Audio) -> None:
-        self.filter: CharacteristicFilter = playback_filter(characteristic, rate_hz=first.rate_hz)
-        self.state = self.filter.at_rest()
-        self.gain = self.filter.rms_gain
-        self.to_drop = self.filter.look_ahead
-        self.next_sample = first.start_sample
-        self.waiting = replace(
-            first,
-            samples=np.empty(0),
-            sigma=np.empty(0),
-            flags=first.flags[:0],
-            history=(*first.history, history_line(characteristic)),
-        )
 
-    def advance(self, piece: Audio) -> Audio:
-        _require_next(piece, start_sample=self.next_sample, rate_hz=self.waiting.rate_hz)
-        self.next_sample += piece.samples.size
-        samples, flags = without_nan(piece.samples, piece.flags)
-        return self._pass_on(samples, piece.sigma * self.gain, flags)
+def _behind(waiting: Audio, piece: Audio) -> Audio:
+    return replace(
+        waiting,
+        samples=np.concatenate([waiting.samples, piece.samples]),
+        sigma=np.concatenate([waiting.sigma, piece.sigma]),
+        flags=np.concatenate([waiting.flags, piece.flags]),
+    )
 
-    def flush(self) -> Audio:
-        return self._pass_on(np.zeros(self.filter.look_ahead), np.empty(0), self.waiting.flags[:0])
 
-    def _pass_on(self, samples: FloatArray, sigma: FloatArray, flags: FlagArray) -> Audio:
-        filtered, self.state = self.filter.advance(samples, self.state)
-        dropped = min(self.to_drop, filtered.size)
-        self.to_drop -= dropped
-        filtered = filtered[dropped:]
-        waiting = self.waiting
-        sigma = np.concatenate([waiting.sigma, sigma])
-        flags = np.concatenate([waiting.flags, flags])
-        done = filtered.size
-        self.waiting = replace(
-            waiting, start_sample=waiting.start_sample + done, sigma=sigma[done:], flags=flags[done:]
-        )
-        return replace(waiting, samples=filtered, sigma=sigma[:done], flags=flags[:done])
+def _silence(count: int, *, after: Audio) -> Audio:
+    return replace(after, samples=np.zeros(count), sigma=np.zeros(count), flags=no_flags(count))
 
 
 def history_line(characteristic: Characteristic) -> str:
@@ -119,21 +107,3 @@ def history_line(characteristic: Characteristic) -> str:
     )
     words = ", ".join(f"{what} {corner:.4g} Hz" for what, corner in corners if corner is not None)
     return f"equalised for playback with {characteristic.title} ({words}; 0 dB at 1 kHz)"
-
-
-def without_nan(samples: FloatArray, flags: FlagArray) -> tuple[FloatArray, FlagArray]:
-    """Return the samples with 0 for NaN, and the flags with `INTERPOLATED` there."""
-    missing = np.isnan(samples)
-    filled = np.where(missing, 0.0, samples)
-    return filled, np.where(missing, flags | np.uint16(Quality.INTERPOLATED), flags).astype(np.uint16)
-
-
-def _require_next(piece: Audio, *, start_sample: int, rate_hz: float) -> None:
-    require(
-        piece.rate_hz == rate_hz, f"a piece at {piece.rate_hz:g} Hz after one at {rate_hz:g} Hz", "one rate throughout"
-    )
-    require(
-        piece.start_sample == start_sample,
-        f"a piece that starts at sample {piece.start_sample}",
-        f"one that starts at {start_sample}, where the last one ended",
-    )
