@@ -64,7 +64,7 @@ class CharacteristicFilter:
     @property
     def rms_gain(self) -> float:
         """Gain of a noise whose spectrum is flat in the audio band, by its rms in that band."""
-        frequency = np.linspace(AUDIO_BAND_HZ[0], min(AUDIO_BAND_HZ[1], self.rate_hz / 2), 4001)
+        frequency = np.arange(AUDIO_BAND_HZ[0], min(AUDIO_BAND_HZ[1], self.rate_hz / 2)) + 0.5
         return float(np.sqrt(np.mean(np.abs(self.response(frequency)) ** 2)))
 
     def at_rest(self) -> FloatArray:
@@ -76,6 +76,8 @@ class CharacteristicFilter:
 
         The output does not depend on how the samples are cut into pieces, to the last bit.
         """
+        if not samples.size:  # lfilter would return a state that it never filled
+            return samples, state
         late, state = signal.lfilter(self.numerator, self.denominator, samples, zi=state)
         return np.asarray(late, np.float64), np.asarray(state, np.float64)
 
@@ -147,7 +149,8 @@ def _fit(
     denominator = np.asarray(np.poly(places), np.float64)
     frequency, weight = _fit_grid(rate_hz)
     turn = np.exp(-2j * np.pi * frequency / rate_hz)
-    taps = turn[:, None] ** np.arange(-LOOK_AHEAD_SAMPLES, LOOK_AHEAD_SAMPLES + 1)
+    tap = np.arange(-LOOK_AHEAD_SAMPLES, LOOK_AHEAD_SAMPLES + 1)
+    taps = np.exp(-2j * np.pi * frequency[:, None] * tap / rate_hz)
     relative = taps * (weight / (np.polyval(denominator[::-1], turn) * response(frequency)))[:, None]
     numerator, *_ = np.linalg.lstsq(
         np.vstack([relative.real, relative.imag]), np.concatenate([weight, 0 * weight]), rcond=None
@@ -159,7 +162,7 @@ def _fit_grid(rate_hz: float) -> tuple[FloatArray, FloatArray]:
     """Return the frequencies of the fit and their weights: logarithmic in the bass, even in the treble."""
     nyquist = rate_hz / 2
     top = min(AUDIO_BAND_HZ[1], 0.95 * nyquist)
-    heard = np.concatenate([np.geomspace(_FIT_FROM_HZ, top / 10, 400), np.linspace(top / 10, top, 800)])
-    unheard = np.linspace(top, 0.98 * nyquist, 800)
+    heard = np.concatenate([np.geomspace(_FIT_FROM_HZ, top / 10, 150), np.linspace(top / 10, top, 300)])
+    unheard = np.linspace(top, 0.98 * nyquist, 200)
     weight = np.concatenate([np.ones(heard.size), np.full(unheard.size, _ULTRASONIC_WEIGHT)])
     return np.concatenate([heard, unheard]), weight

@@ -123,7 +123,8 @@ class Characteristic:
         complex128 array, same shape
             The phase is that of s = +j2πf, without any change at 1 kHz.
         """
-        return self._tilt(np.asarray(frequency_hz, np.float64)) / np.abs(self._tilt(np.asarray(REFERENCE_HZ)))
+        with np.errstate(invalid="ignore"):  # NaN in, NaN out, and no warning
+            return self._tilt(np.asarray(frequency_hz, np.float64)) / np.abs(self._tilt(np.asarray(REFERENCE_HZ)))
 
     def playback_response(self, frequency_hz: npt.ArrayLike) -> ComplexArray:
         """Return the response that undoes the cutter's, P of the module's head, 0 dB at 1 kHz.
@@ -139,7 +140,8 @@ class Characteristic:
         """
         recording = self.recording_response(frequency_hz)
         playback = np.full(recording.shape, complex(np.inf, 0))
-        np.divide(1, recording, out=playback, where=recording != 0)
+        with np.errstate(invalid="ignore"):
+            np.divide(1, recording, out=playback, where=recording != 0)
         return playback
 
     def _tilt(self, frequency_hz: npt.NDArray[Any]) -> ComplexArray:
