@@ -63,7 +63,8 @@ def band_passed(samples: FloatArray, *, rate_hz: float, band_hz: Band, advance_s
     """
     settling = round(_SETTLING_PERIODS * rate_hz / band_hz[0]) + round(abs(advance_s) * rate_hz)
     beyond = max(1, min(len(samples) - 1, settling))
-    continued = _continued(samples, beyond=beyond)
+    # the band passes nothing at 0 Hz, so an offset can go before the ends are continued
+    continued = _continued(samples - samples.mean(), beyond=beyond)
     count = scipy.fft.next_fast_len(len(continued), real=True)
     frequency_hz = np.asarray(np.fft.rfftfreq(count, 1 / rate_hz), np.float64)
     turned = np.exp(2j * np.pi * frequency_hz * advance_s) * band_response(frequency_hz, band_hz=band_hz)

@@ -92,7 +92,7 @@ def _read_truth(path: Path) -> dict[str, FloatArray]:
     needed = f"a truth.npz with {', '.join(_KEYS)}"
     remedy = "give the truth.npz of a simulated capture, or a sound file"
     try:
-        with np.load(path, allow_pickle=False) as stored:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
             missing = [key for key in _KEYS if key not in stored]
             truth = {key: np.asarray(stored[key], np.float64) for key in _KEYS if key not in missing}
     except (OSError, ValueError, zipfile.BadZipFile, EOFError) as error:
