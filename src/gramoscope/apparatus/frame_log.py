@@ -1,0 +1,102 @@
+"""`frames.csv`: where the rig's encoder says that each frame was taken. Nominal, not exact."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gramoscope.apparatus.bench import Sequence
+from gramoscope.conventions import MICROMETRES_PER_METRE, FloatArray
+
+HEADER = ("group", "frame", "arc_um", "time_s")
+STAGE = "stage_um"
+_NAMED_PROBLEMS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class FrameLog:
+    """The log, one entry a frame.
+
+    Attributes
+    ----------
+    arc_m, stage_m : float64 arrays, shape (group, frame)
+        Place s of column 0, and radial position of the microscope; NaN where the log says nothing of use.
+    has_stage : bool
+        Whether the log has a column for the stage.
+    problems : tuple of str
+        What was wrong with it, in words.
+    """
+
+    arc_m: FloatArray
+    stage_m: FloatArray
+    has_stage: bool = False
+    problems: tuple[str, ...] = ()
+
+
+def nominal_arc_m(group: int, *, sequence: Sequence) -> FloatArray:
+    """Return where the frames of a group start when nobody logged it: g · group_step + k · frame_step."""
+    frame = np.arange(sequence.frames_per_group, dtype=np.float64)
+    return np.asarray(group * sequence.group_step_m + frame * sequence.frame_step_m, np.float64)
+
+
+def read_log(path: Path, *, sequence: Sequence) -> FrameLog:
+    """Read a log; what is wrong with it is told and not raised.
+
+    Parameters
+    ----------
+    path : Path
+    sequence : Sequence
+        How many groups and frames there are.
+
+    Returns
+    -------
+    FrameLog
+    """
+    empty = np.full((sequence.groups, sequence.frames_per_group), np.nan)
+    try:
+        with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
+            rows = csv.reader(file)
+            header = tuple(name.strip() for name in next(rows, []))
+            if header not in (HEADER, (*HEADER, STAGE)):
+                wrong = f"{path.name}: the first line is not {','.join(HEADER)}; nominal places are used"
+                return FrameLog(empty, empty, problems=(wrong,))
+            return _filled(rows, empty, name=path.name, has_stage=STAGE in header)
+    except (OSError, csv.Error) as error:
+        reason = "is missing" if isinstance(error, FileNotFoundError) else f"cannot be read ({error})"
+        return FrameLog(empty, empty, problems=(f"{path.name} {reason}; nominal places are used",))
+
+
+def _filled(rows: Iterator[list[str]], empty: FloatArray, *, name: str, has_stage: bool) -> FrameLog:
+    arc_m, stage_m = empty.copy(), empty.copy()
+    problems = []
+    for line, row in enumerate(rows, start=2):
+        if not row:
+            continue
+        problem = _enter(row, arc_m, stage_m, has_stage=has_stage)
+        if problem:
+            problems.append(f"{name}, line {line}: {problem}")
+    if len(problems) > _NAMED_PROBLEMS:
+        problems[_NAMED_PROBLEMS:] = [f"{name}: {len(problems) - _NAMED_PROBLEMS} more lines like these"]
+    return FrameLog(arc_m, stage_m, has_stage=has_stage, problems=tuple(problems))
+
+
+def _enter(row: list[str], arc_m: FloatArray, stage_m: FloatArray, *, has_stage: bool) -> str | None:
+    try:
+        place = int(row[0]), int(row[1])
+        arc_um = float(row[2])
+        stage_um = float(row[len(HEADER)]) if has_stage else 0.0
+    except (ValueError, IndexError):
+        return f"{','.join(row)[:60]!r} is not a row of numbers"
+    if not (0 <= place[0] < arc_m.shape[0] and 0 <= place[1] < arc_m.shape[1]):
+        return f"there is no frame {place[1]} in a group {place[0]}"
+    if not (math.isfinite(arc_um) and math.isfinite(stage_um)):
+        return "a place that is not a finite number"
+    repeated = not math.isnan(arc_m[place])
+    arc_m[place] = arc_um / MICROMETRES_PER_METRE
+    stage_m[place] = stage_um / MICROMETRES_PER_METRE
+    return "the same frame once more; the last entry counts" if repeated else None

@@ -1,0 +1,155 @@
+"""Frames as they lie on disk, and how one becomes the grey picture that the player sees.
+
+A capture keeps its frames in one of four layouts (`frames_tiff`, `frames_image`, `frames_zarr`, `frames_video`). Each reads
+the frames of one group as they were stored, mirrored and coloured as the camera saw them; a frame that cannot be read comes
+as a `Lost` that says why. `develop` then makes the canonical picture: one grey value a pixel, s along the columns, l along
+the rows. A colour pixel becomes the rounded mean of its channels, so that grey stored as colour gives back exactly the grey.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from gramoscope.camera.sensor import Sensor
+from gramoscope.conventions import mirror
+from gramoscope.signal_path import ImageArray
+
+Layout = Literal["tiff", "images", "zarr", "video"]
+Frame = npt.NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Lost:
+    """A frame that cannot be read.
+
+    Parameters
+    ----------
+    why : str
+        In words.
+    rest : bool
+        Whether the same holds for all frames of the group that follow.
+    """
+
+    why: str
+    rest: bool = False
+
+
+class FrameSource(Protocol):
+    """The stored frames of a capture, in one of the layouts."""
+
+    @property
+    def layout(self) -> Layout:
+        """Which layout it is."""
+
+    def read_group(self, number: int) -> Iterator[Frame | Lost]:
+        """Yield the frames of a group as stored; too few when the file ends early. Never raises for a broken file."""
+
+    def files_of_group(self, number: int) -> tuple[Path, ...]:
+        """Return the files that hold this group and no other; the missing ones too."""
+
+    def common_files(self) -> tuple[Path, ...]:
+        """Return the files that belong to the whole capture."""
+
+    def any_frame(self) -> bool:
+        """Tell cheaply whether there is anything to read at all."""
+
+
+def grey_of_colour(frame: npt.NDArray[np.unsignedinteger[Any]]) -> npt.NDArray[np.unsignedinteger[Any]]:
+    """Return the rounded mean of red, green and blue.
+
+    Parameters
+    ----------
+    frame : unsigned integer array, shape (row, column, channel)
+        One channel (grey), two (grey and opacity), three or four (colour and opacity); opacity is not looked at.
+
+    Returns
+    -------
+    unsigned integer array, shape (row, column), same type
+        (r + g + b + 1) // 3.
+    """
+    if frame.shape[-1] < 3:
+        return frame[..., 0]
+    wide = np.uint16 if frame.dtype.itemsize == 1 else np.uint32
+    total: npt.NDArray[np.unsignedinteger[Any]] = np.add(frame[..., 0], frame[..., 1], dtype=wide)
+    total += frame[..., 2]
+    total += wide(1)
+    total //= wide(3)
+    return total.astype(frame.dtype)
+
+
+def fit_to_bits(
+    frame: npt.NDArray[np.unsignedinteger[Any]], *, bits: int
+) -> tuple[npt.NDArray[np.unsignedinteger[Any]], str | None]:
+    """Return a grey frame on the scale of the camera, and what was odd about it.
+
+    Parameters
+    ----------
+    frame : uint8 or uint16 array
+    bits : int
+        Of the camera, 8 … 16.
+
+    Returns
+    -------
+    array, str or None
+        The frame as it is when its numbers fit. A file with fewer bits than the camera, or with larger numbers than the
+        camera can give, uses the full scale of its own kind of number and is brought to the camera's.
+    """
+    white = 2**bits - 1
+    stored_bits = 8 * frame.dtype.itemsize
+    if stored_bits >= bits and (stored_bits == bits or int(frame.max(initial=0)) <= white):
+        return frame, None
+    full = 2**stored_bits - 1
+    scaled = (frame.astype(np.uint32) * np.uint32(white) + np.uint32(full // 2)) // np.uint32(full)
+    reason = f"values of {stored_bits} bits where capture.toml says {bits}: scaled to {bits} bits"
+    return scaled.astype(np.uint8 if bits == 8 else np.uint16), reason
+
+
+class Unusable(str):
+    """What makes a frame of no use."""
+
+    __slots__ = ()
+
+
+def develop(frame: Frame, *, sensor: Sensor, out: ImageArray) -> str | None:
+    """Make a stored frame a canonical grey picture.
+
+    Parameters
+    ----------
+    frame : array, shape (row, column) or (row, column, channel)
+        As stored.
+    sensor : Sensor
+    out : uint8 or uint16 array, shape (row, column)
+        Receives the picture; left as it is when the frame is unusable.
+
+    Returns
+    -------
+    str or None
+        What is wrong, in words. `Unusable` when nothing was written.
+    """
+    if frame.dtype not in (np.uint8, np.uint16):
+        return Unusable(f"pixels of type {frame.dtype}, needed whole numbers of 8 or 16 bits")
+    if frame.ndim not in (2, 3):
+        return Unusable(f"a picture of {frame.ndim} dimensions")
+    if frame.shape[:2] != out.shape:
+        return Unusable(wrong_size(frame.shape[1], frame.shape[0], sensor=sensor))
+    grey = grey_of_colour(frame) if frame.ndim == 3 else frame
+    fitted, remark = fit_to_bits(grey, bits=sensor.bits)
+    out[...] = mirror(fitted, columns=sensor.columns, rows=sensor.rows)
+    return remark
+
+
+def wrong_size(width_px: int, height_px: int, *, sensor: Sensor) -> str:
+    """Return what is wrong with a frame of another size than the camera's."""
+    return f"{width_px} × {height_px} pixels, needed {sensor.width_px} × {sensor.height_px}"
+
+
+def words_of(error: BaseException) -> str:
+    """Return what a library said, on one short line."""
+    text = " ".join(str(error).split())[:160]
+    return text or type(error).__name__

@@ -1,0 +1,152 @@
+"""One TIFF a group, one page a frame: plain, BigTIFF or OME-TIFF."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tifffile
+from PIL import Image
+
+from gramoscope.camera.frames import Frame, Layout, Lost, words_of, wrong_size
+from gramoscope.camera.pattern import FramePattern, is_inside
+from gramoscope.camera.quiet import quiet_log, quiet_warnings
+from gramoscope.camera.sensor import Sensor
+
+_PLANAR = 2
+_WHITE_IS_ZERO = 0
+
+
+@dataclass(frozen=True)
+class TiffFrames:
+    """The frames of a capture with one TIFF a group."""
+
+    folder: Path
+    pattern: FramePattern
+    groups: int
+    sensor: Sensor
+    layout: Layout = "tiff"
+
+    def read_group(self, number: int) -> Iterator[Frame | Lost]:
+        """Yield the pages of one group's file."""
+        path = self.pattern.path(self.folder, group=number)
+        return read_pages(path, folder=self.folder, sensor=self.sensor)
+
+    def files_of_group(self, number: int) -> tuple[Path, ...]:
+        """Return the one file of the group."""
+        return (self.pattern.path(self.folder, group=number),)
+
+    def common_files(self) -> tuple[Path, ...]:
+        """Return nothing: every file belongs to a group."""
+        return ()
+
+    def any_frame(self) -> bool:
+        """Tell whether the file of any group exists."""
+        return any(self.files_of_group(number)[0].is_file() for number in range(self.groups))
+
+
+def read_pages(path: Path, *, folder: Path, sensor: Sensor) -> Iterator[Frame | Lost]:
+    """Yield the pages of a TIFF in order.
+
+    Parameters
+    ----------
+    path, folder : Path
+        The file, and the folder that it must not leave.
+    sensor : Sensor
+        Whose size the pages need to have: others are not even decoded.
+
+    Yields
+    ------
+    array, shape (row, column) or (row, column, channel), or Lost
+    """
+    if not is_inside(path, folder):
+        yield Lost(f"{path.name} lies outside the folder of the capture and was not opened", rest=True)
+        return
+    try:
+        with quiet_log():
+            tiff = tifffile.TiffFile(path)
+            channels = _channel_pages(tiff)
+    except FileNotFoundError:
+        yield Lost(f"{path.name} is missing", rest=True)
+        return
+    except Exception as error:  # decoders raise whatever they like at a broken file
+        yield Lost(f"{path.name} cannot be read ({words_of(error)})", rest=True)
+        return
+    with tiff:
+        yield from _read_pages(tiff, path=path, channels=channels, sensor=sensor)
+
+
+def _read_pages(tiff: tifffile.TiffFile, *, path: Path, channels: int, sensor: Sensor) -> Iterator[Frame | Lost]:
+    for number in itertools.count():
+        try:
+            with quiet_log():
+                frame = _colours(tiff, number * channels, channels=channels, path=path, sensor=sensor)
+        except IndexError:
+            return
+        except Exception as error:  # as above
+            yield Lost(f"{path.name} is damaged ({words_of(error)})")
+        else:
+            yield frame
+
+
+def _colours(tiff: tifffile.TiffFile, index: int, *, channels: int, path: Path, sensor: Sensor) -> Frame:
+    if channels == 1:
+        return _page(tiff, index, path=path, sensor=sensor)
+    return np.stack([_page(tiff, index + k, path=path, sensor=sensor) for k in range(channels)], axis=-1)
+
+
+def _page(tiff: tifffile.TiffFile, index: int, *, path: Path, sensor: Sensor) -> Frame:
+    page = tiff.pages[index]
+    key: Any = page.keyframe
+    if (key.imagewidth, key.imagelength) != (sensor.width_px, sensor.height_px):
+        raise ValueError(wrong_size(key.imagewidth, key.imagelength, sensor=sensor))
+    try:
+        frame: Frame = page.asarray()
+    except ValueError as error:
+        if "imagecodecs" not in str(error):
+            raise
+        return _page_by_pillow(path, index)
+    if key.photometric == _WHITE_IS_ZERO:
+        frame = np.asarray(2**key.bitspersample - 1 - frame, frame.dtype)
+    return np.moveaxis(frame, 0, -1) if frame.ndim == 3 and key.planarconfig == _PLANAR else frame
+
+
+def _page_by_pillow(path: Path, index: int) -> Frame:
+    # Pillow brings libtiff, and with it the compressions (LZW, JPEG) for which tifffile would want another package
+    with quiet_warnings(), Image.open(path) as picture:
+        picture.seek(index)
+        return np.array(picture)
+
+
+def _channel_pages(tiff: tifffile.TiffFile) -> int:
+    """Return how many pages make one frame: three where an OME-TIFF or ImageJ file keeps colours on pages of their own."""
+    if not (tiff.is_ome or tiff.is_imagej):
+        return 1
+    series = tiff.series[0]
+    axes = series.axes
+    apart = axes.endswith("CYX") and series.shape[-3] == 3
+    return 3 if apart else 1
+
+
+def write_tiff(path: Path, frames: Frame, *, compress: bool = False) -> None:
+    """Write frames as the pages of one TIFF.
+
+    Parameters
+    ----------
+    path : Path
+    frames : uint8 or uint16 array, shape (frame, row, column) or (frame, row, column, 3)
+        As stored.
+    compress : bool
+        With deflate; otherwise plain, which reads ten times faster.
+    """
+    tifffile.imwrite(
+        path,
+        frames,
+        photometric="rgb" if frames.ndim == 4 else "minisblack",
+        compression="zlib" if compress else None,
+        metadata=None,
+    )
