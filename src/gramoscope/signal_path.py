@@ -65,6 +65,27 @@ class FrameGroup:
 
 
 @dataclass(frozen=True, eq=False)
+class Texture:
+    """A strip of registered, filtered picture, for matching with its neighbour.
+
+    Attributes
+    ----------
+    strip : float32 array, shape (row, column)
+        Zero mean where nothing is to be seen.
+    arc_start_m : float
+        Nominal place s of column 0, on the same footing as `WallTrace.arc_start_m`.
+    pixel_pitch_m : float
+    stage_m : float
+        Where the microscope stood.
+    """
+
+    strip: npt.NDArray[np.float32]
+    arc_start_m: float
+    pixel_pitch_m: float
+    stage_m: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
 class WallTrace:
     """Where both walls of one stretch run.
 
@@ -85,13 +106,9 @@ class WallTrace:
         How many neighbouring samples share one error: the information of n samples is n / `correlation_samples` times
         that of one. 1 when errors are independent.
     flags : uint16 array, shape (2, sample)
-    head, tail : float32 arrays, shape (stripe, row, column), or None
-        The texture along the stripes at the start and the end of the stretch, by which the tonearm finds out how far
-        the record really turned from one stretch to the next; column 0 lies at `arc_start_m` + `head_offset_m` or
-        + `tail_offset_m`, and columns are one pixel apart.
-    head_offset_m, tail_offset_m : float
-    texture_pitch_m : float
-        From one column of `head` and `tail` to the next.
+    head, tail : Texture or None
+        The texture at the start and the end of the stretch, by which the tonearm finds out how far the record really
+        turned from one stretch to the next.
     frame_step_m : float64 array, shape (frame − 1,)
         How far the record really turned from frame to frame, by the flow; NaN where it could not be seen.
     noise_share : float
@@ -108,11 +125,8 @@ class WallTrace:
     slope_sigma: FloatArray
     correlation_samples: float
     flags: FlagArray
-    head: npt.NDArray[np.float32] | None = None
-    tail: npt.NDArray[np.float32] | None = None
-    head_offset_m: float = 0.0
-    tail_offset_m: float = 0.0
-    texture_pitch_m: float = float("nan")
+    head: Texture | None = None
+    tail: Texture | None = None
     frame_step_m: FloatArray = field(default_factory=lambda: np.empty(0))
     noise_share: float = float("nan")
     problems: tuple[str, ...] = ()

@@ -1,0 +1,277 @@
+"""The frames of a group laid over each other along the motion of the record.
+
+The texture is fixed to the record, so frame k shows at column x what the first frame showed at column x + d_k, where d_k is
+how far the record has turned. Laid over each other, the frames give at every point of the *canvas* (the coordinates of the
+first frame, extended forward by the last d_k)
+
+- their mean M, in which camera noise is √n smaller, and
+- their trend T, the slope of a straight line through the n values, in grey levels a frame: the temporal derivative that
+  remains when the motion assumed was not quite right. All frames of the group take part in it, not only two.
+
+`frame_shifts` finds the d_k themselves: a least-squares flow with one unknown for each pair of frames, over the rows that
+carry texture.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from gramoscope.conventions import FloatArray
+from gramoscope.signal_path import FrameGroup, ImageArray
+
+Float32Array = npt.NDArray[np.float32]
+
+CONVERGED_PX = 1e-3
+"""Steps of the shift search below this are no longer worth a round."""
+
+
+@dataclass(frozen=True, eq=False)
+class Canvas:
+    """The frames of a group laid over each other.
+
+    Attributes
+    ----------
+    mean, trend : float32 arrays, shape (row, column)
+        M in grey levels and T in grey levels a frame; `trend` is zero where fewer than two frames overlap.
+    frames : int array, shape (column,)
+        How many frames each column rests on.
+    shift_px : float64 array, shape (frame,)
+        d_k of each frame used.
+    frame_index : int array, shape (frame,)
+        Which frames of the group were used.
+    """
+
+    mean: Float32Array
+    trend: Float32Array
+    frames: npt.NDArray[np.int64]
+    shift_px: FloatArray
+    frame_index: npt.NDArray[np.int64]
+
+
+@numba.njit(cache=True, nogil=True)
+def cubic_taps(fraction: float) -> tuple[float, float, float, float]:
+    """Return the four weights of Catmull–Rom interpolation at `fraction` (0 … 1) between the middle two samples."""
+    f = fraction
+    return (
+        f * (-0.5 + f * (1.0 - 0.5 * f)),
+        1.0 + f * f * (-2.5 + 1.5 * f),
+        f * (0.5 + f * (2.0 - 1.5 * f)),
+        f * f * (-0.5 + 0.5 * f),
+    )
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_row(row, start, stop, offset, taps, weight, total, moment):  # type: ignore[no-untyped-def]
+    w0, w1, w2, w3 = taps
+    w0, w1, w2, w3 = np.float32(w0), np.float32(w1), np.float32(w2), np.float32(w3)
+    k = np.float32(weight)
+    for x in range(start, stop):
+        i = x + offset
+        value = w0 * row[i - 1] + w1 * row[i] + w2 * row[i + 1] + w3 * row[i + 2]
+        total[x] += value
+        moment[x] += k * value
+
+
+@numba.njit(cache=True, nogil=True)
+def _placement(shift_px: float, width: int, canvas_width: int) -> tuple[int, int, int, float]:
+    """Canvas columns [start, stop) that a frame covers, its column minus theirs, and the fraction between."""
+    offset = int(np.floor(-shift_px))
+    fraction = -shift_px - offset
+    start = max(0, 1 - offset)
+    stop = min(canvas_width, width - 2 - offset)
+    return start, stop, offset, fraction
+
+
+@numba.njit(cache=True, nogil=True)
+def _register(images, shift_px, weights, counts, mean_weight, spread, mean, trend):  # type: ignore[no-untyped-def]
+    frames, height, width = images.shape
+    canvas_width = mean.shape[1]
+    moment = np.empty(canvas_width, np.float32)
+    total = np.empty(canvas_width, np.float32)
+    for row in range(height):
+        total[:] = np.float32(0)
+        moment[:] = np.float32(0)
+        for k in range(frames):
+            start, stop, offset, fraction = _placement(shift_px[k], width, canvas_width)
+            _add_row(images[k, row], start, stop, offset, cubic_taps(fraction), weights[k], total, moment)
+        for x in range(canvas_width):
+            if counts[x] > 0:
+                mean[row, x] = total[x] / counts[x]
+                trend[row, x] = (moment[x] - mean_weight[x] * total[x]) * spread[x]
+
+
+def register(images: ImageArray, shift_px: FloatArray, frame_index: npt.NDArray[np.int64]) -> Canvas:
+    """Lay frames over each other along their shifts.
+
+    Parameters
+    ----------
+    images : uint8 or uint16 array, shape (frame, row, column)
+    shift_px : float64 array, shape (frame,)
+        d_k ≥ 0, how far the record has turned since the first frame.
+    frame_index : int array, shape (frame,)
+        Number of each frame in running order: the abscissa of the trend.
+
+    Returns
+    -------
+    Canvas
+        Columns that no frame covers (one at each end, lost to interpolation) repeat their neighbour.
+    """
+    height, width = images.shape[1:]
+    canvas_width = width + int(np.floor(shift_px.max(initial=0.0)))
+    counts, first, second = (np.zeros(canvas_width) for _ in range(3))
+    for shift, k in zip(shift_px, frame_index, strict=True):
+        start, stop, _, _ = _placement(float(shift), width, canvas_width)
+        counts[start:stop] += 1
+        first[start:stop] += k
+        second[start:stop] += k * k
+    mean_index = first / np.maximum(counts, 1)
+    variance = second - counts * mean_index**2
+    spread = np.where(variance > 0, 1 / np.maximum(variance, 1e-12), 0.0)
+    mean, trend = (np.zeros((height, canvas_width), np.float32) for _ in range(2))
+    _register(
+        images,
+        shift_px,
+        frame_index.astype(np.float64),
+        counts.astype(np.float32),
+        mean_index.astype(np.float32),
+        spread.astype(np.float32),
+        mean,
+        trend,
+    )
+    covered = np.flatnonzero(counts)
+    if covered.size:
+        mean[:, : covered[0]] = mean[:, covered[0], None]
+        mean[:, covered[-1] + 1 :] = mean[:, covered[-1], None]
+    return Canvas(mean, trend, counts.astype(np.int64), shift_px, frame_index)
+
+
+@numba.njit(cache=True, nogil=True)
+def _row_texture(row):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for x in range(2, row.size - 2, 2):
+        gradient = float(row[x + 2]) - float(row[x - 2])
+        total += gradient * gradient
+    return total
+
+
+@numba.njit(cache=True, nogil=True)
+def _texture_of_rows(image):  # type: ignore[no-untyped-def]
+    out = np.empty(image.shape[0])
+    for row in range(image.shape[0]):
+        out[row] = _row_texture(image[row])
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _row_normal_equation(here, there, offset, taps, start, stop):  # type: ignore[no-untyped-def]
+    w0, w1, w2, w3 = taps
+    square = 0.0
+    cross = 0.0
+    for x in range(start, stop):
+        i = x + offset
+        moved = w0 * there[i - 1] + w1 * there[i] + w2 * there[i + 1] + w3 * there[i + 2]
+        gradient = 0.25 * (float(here[x + 2]) + float(here[x + 1]) - float(here[x - 1]) - float(here[x - 2])) / 1.5
+        square += gradient * gradient
+        cross += gradient * (moved - float(here[x]))
+    return square, cross
+
+
+@numba.njit(cache=True, nogil=True)
+def _shift_correction(here, there, rows, shift_px):  # type: ignore[no-untyped-def]
+    width = here.shape[1]
+    start, stop, offset, fraction = _placement(shift_px, width, width)
+    start, stop = max(start, 2), min(stop, width - 2)
+    taps = cubic_taps(fraction)
+    square = 0.0
+    cross = 0.0
+    for row in rows:
+        s, c = _row_normal_equation(here[row], there[row], offset, taps, start, stop)
+        square += s
+        cross += c
+    return cross / square if square > 0 else 0.0
+
+
+def textured_rows(image: npt.NDArray[np.uint8] | npt.NDArray[np.uint16], *, share: float = 0.25) -> npt.NDArray[np.int64]:
+    """Return the rows whose gradients along the groove hold at least `share` of the strongest row's power.
+
+    The power that every row has (camera noise) is taken off first, as the lower quartile over the rows.
+    """
+    power = _texture_of_rows(image)
+    power = np.maximum(power - np.quantile(power, 0.25), 0.0)
+    return np.flatnonzero(power >= share * power.max()) if power.max() > 0 else np.arange(image.shape[0])
+
+
+def pair_shift_px(
+    here: npt.NDArray[np.uint8] | npt.NDArray[np.uint16],
+    there: npt.NDArray[np.uint8] | npt.NDArray[np.uint16],
+    *,
+    expected_px: float,
+    rows: npt.NDArray[np.int64],
+    reach_px: float = 3.0,
+    rounds: int = 12,
+) -> float:
+    """Return how far the record turned from one frame to a later one, by least-squares flow along the groove.
+
+    Minimises Σ (I₂(x − d) − I₁(x))² over the rows that carry texture by Gauss–Newton steps from the expected d: the flow
+    of Lucas and Kanade (1981) with one unknown for a pair of frames.
+
+    Parameters
+    ----------
+    here, there : uint arrays, shape (row, column)
+    expected_px : float
+        Where to start, ≥ 0.
+    rows : int array
+        Rows to use, see `textured_rows`.
+    reach_px : float
+        How far from the expectation an answer is believed.
+    rounds : int
+        At most so many steps.
+
+    Returns
+    -------
+    float
+        d in pixels; NaN when the search does not converge within `reach_px`.
+    """
+    shift = expected_px
+    for _ in range(rounds):
+        step = float(np.clip(_shift_correction(here, there, rows, shift), -0.5, 0.5))
+        shift += step
+        if not abs(shift - expected_px) <= reach_px or shift < 0:
+            return float("nan")
+        if abs(step) < CONVERGED_PX:
+            return shift
+    return float("nan")
+
+
+def frame_shifts(group: FrameGroup) -> tuple[FloatArray, FloatArray]:
+    """Return how far the record really turned by each valid frame of a group.
+
+    Parameters
+    ----------
+    group : FrameGroup
+        At least one frame valid.
+
+    Returns
+    -------
+    shift_px : float64 array, shape (valid frame,)
+        Since the first valid frame.
+    frame_step_m : float64 array, shape (frame − 1,)
+        From frame to frame; NaN beside a frame that is not valid and where the flow could not be found (there the
+        nominal step is used in `shift_px`).
+    """
+    index = np.flatnonzero(group.valid)
+    nominal = group.arc_start_m / group.pixel_pitch_m
+    rows = textured_rows(group.images[index[0]])
+    step_m = np.full(max(group.images.shape[0] - 1, 0), np.nan)
+    shift = np.zeros(index.size)
+    for i, (a, b) in enumerate(zip(index[:-1], index[1:], strict=True)):
+        expected = max(float(nominal[b] - nominal[a]), 0.0)
+        found = pair_shift_px(group.images[a], group.images[b], expected_px=expected, rows=rows)
+        shift[i + 1] = shift[i] + (expected if np.isnan(found) else found)
+        if b == a + 1:
+            step_m[a] = found * group.pixel_pitch_m
+    return shift, step_m

@@ -1,0 +1,393 @@
+"""The cartridge of the paper: flow → in-focus points → Hough transform → two centroid lines → orientation of the wall.
+
+Sections 5 and 6 of B. Tian and J. L. Barron, *Sound from gramophone record groove surface orientation*. Where the paper
+is silent the choices are ours and say so where they stand: `flow.horn_schunck` (the constraint), `wall` (the robust
+estimator), `stripes` (which peak is which stripe), and one departure: the Hough transform may work on several *segments*
+of the stretch, because in loud passages a stripe is no longer one straight line across the picture. With one segment it
+is the paper's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from gramoscope.apparatus.bench import Bench
+from gramoscope.conventions import INNER, OUTER, FloatArray, lateral_of_row_m, rad
+from gramoscope.errors import require
+from gramoscope.pickup.centreline import Centreline, centroids, fill_voids
+from gramoscope.pickup.exposure import Exposure
+from gramoscope.pickup.flow.derivatives import Derivatives, group_derivatives, texture_contrast
+from gramoscope.pickup.flow.horn_schunck import Flow, FlowMethod, GrooveHornSchunck
+from gramoscope.pickup.hough import Accumulator, Line, accumulate, peaks, segment
+from gramoscope.pickup.in_focus import InFocus
+from gramoscope.pickup.registration import Canvas, frame_shifts, register
+from gramoscope.pickup.stripes import Stripe, StripeModel, expected_stripes
+from gramoscope.pickup.wall import Planes, WallOrientation
+from gramoscope.pickup.wall_samples import WallSamples, samples_of_wall
+from gramoscope.quality import Quality, no_flags
+from gramoscope.signal_path import FrameGroup, Texture, WallTrace
+
+IntArray = npt.NDArray[np.int64]
+CANDIDATE_LINES = 6
+TEXTURE_REACH_PX = 40
+"""How far, beyond the nominal overlap, the strips reach that neighbouring stretches are matched by."""
+
+@dataclass(frozen=True)
+class HoughSearch:
+    """The Hough transform and the regions of its peaks.
+
+    Parameters
+    ----------
+    theta_reach_deg : float
+        Largest |θ| tried; 45 in the paper.
+    theta_step_deg : float
+        1 in the paper.
+    region_theta_deg, region_rho_px : float
+        Half size of the box about a peak: a point belongs to the peak when a line through it does.
+    separation_px : float
+        Least distance between two peaks, about half the least distance of two stripes.
+    segments : int
+        Into how many stretches of columns the picture is cut; 1 in the paper.
+    """
+
+    theta_reach_deg: float = 45.0
+    theta_step_deg: float = 1.0
+    region_theta_deg: float = 1.5
+    region_rho_px: float = 9.0
+    separation_px: float = 30.0
+    segments: int = 4
+
+    def __post_init__(self) -> None:
+        require(0 < self.theta_reach_deg <= 80, f"theta reaches to {self.theta_reach_deg}°", "above 0, at most 80")
+        require(0 < self.theta_step_deg <= 10, f"theta steps of {self.theta_step_deg}°", "above 0, at most 10")
+        require(self.segments >= 1, f"{self.segments} segments", "at least one")
+
+    @property
+    def theta_rad(self) -> FloatArray:
+        """The angles tried."""
+        steps = round(self.theta_reach_deg / self.theta_step_deg)
+        return np.deg2rad(np.arange(-steps, steps + 1) * self.theta_step_deg)
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentReading:
+    """What the Hough transform found in one segment.
+
+    Attributes
+    ----------
+    start, stop : int
+        Its columns.
+    accumulator : Accumulator
+    candidates : list of Line
+        Peaks, strongest first.
+    lines : list of Line or None
+        The line of each expected stripe.
+    """
+
+    start: int
+    stop: int
+    accumulator: Accumulator
+    candidates: list[Line]
+    lines: list[Line | None]
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """Everything that was seen on the way, for pictures and for doubters.
+
+    Attributes
+    ----------
+    group : FrameGroup
+        Without its useless frames.
+    canvas : Canvas
+    derivatives : Derivatives
+        Scaled to the texture's contrast.
+    contrast : float
+        Grey levels a pixel, of the sharpest region.
+    flow : Flow or None
+    point_row, point_column : int arrays, shape (point,)
+        In-focus points.
+    label : int array, shape (point,)
+        Number of the stripe; −1 in no region, −2 disputed.
+    segments : list of SegmentReading
+    stripes : tuple of Stripe
+        As expected from the bench.
+    centrelines : list of Centreline
+        One for each stripe.
+    kept : tuple of int
+        The stripes that make the wall; the others are set aside.
+    planes : Planes
+    trace : WallTrace
+    """
+
+    group: FrameGroup
+    canvas: Canvas
+    derivatives: Derivatives
+    contrast: float
+    flow: Flow | None
+    point_row: IntArray
+    point_column: IntArray
+    label: IntArray
+    segments: list[SegmentReading]
+    stripes: tuple[Stripe, ...]
+    centrelines: list[Centreline]
+    kept: tuple[int, ...]
+    planes: Planes
+    trace: WallTrace
+
+
+@dataclass(frozen=True)
+class SeedPaperPickup:
+    """The cartridge of the paper.
+
+    Parameters
+    ----------
+    bench : Bench
+        What the apparatus is.
+    flow : HornSchunck or GrooveHornSchunck
+        Weights are in units of the sharpest region's gradient.
+    smoothing_px : float
+        Gaussian before the derivatives.
+    exposure, in_focus, hough, stripe_model, orientation
+        The steps; see each.
+    """
+
+    bench: Bench
+    flow: FlowMethod = field(default_factory=GrooveHornSchunck)
+    smoothing_px: float = 1.5
+    exposure: Exposure = field(default_factory=Exposure)
+    in_focus: InFocus = field(default_factory=InFocus)
+    hough: HoughSearch = field(default_factory=HoughSearch)
+    stripe_model: StripeModel = field(default_factory=StripeModel)
+    orientation: WallOrientation = field(default_factory=WallOrientation)
+
+    def read(self, group: FrameGroup) -> WallTrace:
+        """Return where the wall of one stretch runs.
+
+        Parameters
+        ----------
+        group : FrameGroup
+
+        Returns
+        -------
+        WallTrace
+            One wall of a dual-focal capture (the one that shows two stripes), both walls without a cover glass. A
+            stretch without a usable frame gives NaN and flags, never an exception.
+        """
+        group, exposure_flags = self.exposure.sort_out(group)
+        if not group.valid.any():
+            return self._lost(group, exposure_flags)
+        return self._read(group, exposure_flags).trace
+
+    def inspect(self, group: FrameGroup) -> Reading | None:
+        """Return everything that was seen on the way to a trace, None when no frame is usable."""
+        group, exposure_flags = self.exposure.sort_out(group)
+        return self._read(group, exposure_flags) if group.valid.any() else None
+
+    def _read(self, group: FrameGroup, exposure_flags: Quality) -> Reading:
+        shift_px, step_m = frame_shifts(group)
+        index = np.flatnonzero(group.valid)
+        images = group.images if index.size == group.images.shape[0] else group.images[index]
+        canvas = register(images, shift_px, index)
+        raw = group_derivatives(canvas, smoothing_px=self.smoothing_px)
+        contrast = texture_contrast(raw.x)
+        derivatives = raw.scaled(1 / contrast if contrast > 0 else 0.0)
+        flow = self._flow(derivatives, step_m) if index.size > 1 else None
+        rows, columns = np.nonzero(self.in_focus.mask(derivatives, flow))
+        stripes = expected_stripes(self.bench)
+        segments = self._find_lines(rows, columns, stripes, canvas.mean.shape)
+        label = self._label(rows, columns, segments)
+        weights = derivatives.x[rows, columns].astype(np.float64) ** 2
+        lines = [
+            self._centreline(number, rows, columns, weights, label, segments, canvas.mean.shape[1])
+            for number in range(len(stripes))
+        ]
+        kept = _kept(stripes)
+        planes, samples = self._orient(stripes, lines, segments)
+        head, tail = self._textures(group, canvas, derivatives)
+        trace = replace(self._trace(group, samples, exposure_flags, step_m), head=head, tail=tail)
+        return Reading(
+            group, canvas, derivatives, contrast, flow, rows, columns, label, segments, stripes, lines, kept, planes, trace
+        )
+
+    def _flow(self, derivatives: Derivatives, step_m: FloatArray) -> Flow:
+        known = step_m[np.isfinite(step_m)]
+        step = float(np.median(known)) if known.size else self.bench.sequence.frame_step_m
+        return self.flow.flow(derivatives, shear=self._shear(derivatives.x.shape[0], step))
+
+    def _shear(self, height: int, step_m: float) -> FloatArray:
+        """g: how the flow changes down the rows on the walls of a groove at rest in the middle of the picture."""
+        bench = self.bench
+        lateral = lateral_of_row_m(np.arange(height), height_px=height, pixel_pitch_m=bench.sensor.pixel_pitch_m)
+        on_wall = np.abs(lateral) < bench.disc.groove_width_m / 2
+        # beyond the middle the wall rises towards the lens: nearer points move faster
+        rise = np.sign(lateral) * np.tan(bench.disc.wall_angle_rad) * on_wall
+        return np.asarray(step_m * rise / bench.objective.object_distance_m)
+
+    def _find_lines(
+        self, rows: IntArray, columns: IntArray, stripes: tuple[Stripe, ...], shape: tuple[int, ...]
+    ) -> list[SegmentReading]:
+        borders = np.linspace(0, shape[1], self.hough.segments + 1).astype(int)
+        found = []
+        for start, stop in zip(borders[:-1], borders[1:], strict=True):
+            inside = (columns >= start) & (columns < stop)
+            accumulator = accumulate(
+                rows[inside],
+                columns[inside],
+                row_origin=(shape[0] - 1) / 2,
+                column_origin=(start + stop - 1) / 2,
+                theta_rad=self.hough.theta_rad,
+            )
+            candidates = peaks(accumulator, count=CANDIDATE_LINES, separation_px=self.hough.separation_px)
+            glass = self.bench.cover_glass
+            lines = self.stripe_model.assign(
+                candidates,
+                stripes,
+                edge_row=self.bench.glass_edge_row if glass else None,
+                glass_low=glass is not None and glass.side == "low",
+            )
+            found.append(SegmentReading(int(start), int(stop), accumulator, candidates, lines))
+        return found
+
+    def _label(self, rows: IntArray, columns: IntArray, segments: list[SegmentReading]) -> IntArray:
+        label = np.full(rows.size, -1, np.int64)
+        for part in segments:
+            inside = np.flatnonzero((columns >= part.start) & (columns < part.stop))
+            numbers = [i for i, line in enumerate(part.lines) if line is not None]
+            local = segment(
+                rows[inside],
+                columns[inside],
+                [line for line in part.lines if line is not None],
+                theta_reach_rad=rad(self.hough.region_theta_deg),
+                rho_reach_px=self.hough.region_rho_px,
+            )
+            label[inside] = np.array([*numbers, -2, -1])[local] if numbers else -1
+        return label
+
+    def _centreline(
+        self,
+        number: int,
+        rows: IntArray,
+        columns: IntArray,
+        weights: FloatArray,
+        label: IntArray,
+        segments: list[SegmentReading],
+        width: int,
+    ) -> Centreline:
+        mine = label == number
+        row, _ = centroids(rows[mine], columns[mine], weights[mine], width=width)
+        line_row = np.full(width, np.nan)
+        for part in segments:
+            line = part.lines[number]
+            if line is not None:
+                line_row[part.start : part.stop] = line.row_at(np.arange(part.start, part.stop))
+        return fill_voids(row, line_row)
+
+    def _orient(
+        self, stripes: tuple[Stripe, ...], lines: list[Centreline], segments: list[SegmentReading]
+    ) -> tuple[Planes, dict[int, WallSamples]]:
+        """Planes and samples of each wall that the kept stripes make; the planes are those of the last wall."""
+        stations = self.orientation.stations(lines[0].row.size)
+        samples = {}
+        for wall in sorted({stripes[i].wall for i in _kept(stripes)}):
+            mine = [i for i in _kept(stripes) if stripes[i].wall == wall]
+            rows = np.array([lines[i].row for i in mine])
+            measured = np.array([lines[i].measured for i in mine])
+            planes = self.orientation.fit(rows, measured)
+            samples[wall] = samples_of_wall(
+                planes,
+                rows,
+                measured,
+                stations,
+                line_slope=_line_slope(segments, mine, stations),
+                expected_row=np.array([stripes[i].row for i in mine]),
+            )
+        return planes, samples
+
+    def _trace(
+        self, group: FrameGroup, samples: dict[int, WallSamples], flags: Quality, step_m: FloatArray
+    ) -> WallTrace:
+        """Walls in metres; a wall that the method does not read is NaN."""
+        first = int(np.flatnonzero(group.valid)[0])
+        pitch = group.pixel_pitch_m
+        stations = next(iter(samples.values())).slope.size
+        offset, offset_sigma, slope, slope_sigma = (np.full((2, stations), np.nan) for _ in range(4))
+        wall_flags = np.full((2, stations), Quality.NO_STRIPE | Quality.INTERPOLATED, np.uint16)
+        for wall, sample in samples.items():
+            offset[wall] = lateral_of_row_m(
+                sample.row_px,
+                height_px=group.images.shape[1],
+                pixel_pitch_m=pitch,
+                stage_m=float(group.stage_m[first]),
+            )
+            offset_sigma[wall] = pitch * sample.row_sigma_px
+            slope[wall], slope_sigma[wall] = sample.slope, sample.slope_sigma
+            wall_flags[wall] = sample.flags | np.uint16(flags)
+        return WallTrace(
+            number=group.number,
+            arc_start_m=float(group.arc_start_m[first]),
+            arc_step_m=pitch * self.orientation.stride_px,
+            offset_m=offset,
+            offset_sigma_m=offset_sigma,
+            slope=slope,
+            slope_sigma=slope_sigma,
+            correlation_samples=self.orientation.neighbourhood_px / self.orientation.stride_px,
+            flags=wall_flags,
+            frame_step_m=step_m,
+            problems=group.problems,
+        )
+
+    def _textures(
+        self, group: FrameGroup, canvas: Canvas, derivatives: Derivatives
+    ) -> tuple[Texture | None, Texture | None]:
+        first = int(canvas.frame_index[0])
+        pitch = group.pixel_pitch_m
+        width = canvas.mean.shape[1]
+        overlap = width - round(self.bench.sequence.group_step_m / pitch)
+        if overlap <= 0:
+            return None, None
+        length = min(overlap + TEXTURE_REACH_PX, width)
+        start, stage = float(group.arc_start_m[first]), float(group.stage_m[first])
+        return (
+            Texture(derivatives.x[:, :length].copy(), start, pitch, stage),
+            Texture(derivatives.x[:, width - length :].copy(), start + (width - length) * pitch, pitch, stage),
+        )
+
+    def _lost(self, group: FrameGroup, flags: Quality) -> WallTrace:
+        """A stretch without a usable frame: nothing but flags."""
+        stations = self.orientation.stations(group.images.shape[2]).size
+        nothing = np.full((2, stations), np.nan)
+        return WallTrace(
+            number=group.number,
+            arc_start_m=float(group.arc_start_m[0]),
+            arc_step_m=group.pixel_pitch_m * self.orientation.stride_px,
+            offset_m=nothing,
+            offset_sigma_m=nothing,
+            slope=nothing,
+            slope_sigma=nothing,
+            correlation_samples=1.0,
+            flags=no_flags(2, stations) | np.uint16(flags | Quality.INTERPOLATED),
+            problems=group.problems,
+        )
+
+
+def _kept(stripes: tuple[Stripe, ...]) -> tuple[int, ...]:
+    """The stripes of the wall that shows two of them; all stripes when no wall does."""
+    for wall in (INNER, OUTER):
+        mine = tuple(i for i, stripe in enumerate(stripes) if stripe.wall == wall)
+        if len(mine) == 2:
+            return mine
+    return tuple(range(len(stripes)))
+
+
+def _line_slope(segments: list[SegmentReading], stripes: list[int], stations: FloatArray) -> FloatArray:
+    """Mean slope of the Hough lines of some stripes at each station; NaN where none was found."""
+    slope = np.full(stations.size, np.nan)
+    for part in segments:
+        found = [line.slope for i in stripes if (line := part.lines[i]) is not None]
+        if found:
+            slope[(stations >= part.start) & (stations < part.stop)] = np.mean(found)
+    return slope

@@ -1,0 +1,154 @@
+"""Which line is which stripe.
+
+A dual-focal objective shows three sharp stripes: both walls at the depth that is sharp through the glass, and one of them
+once more, nearer to the land, beyond the edge of the glass. The lines that the Hough transform finds are given these roles
+by what the bench knows: the distance between the two stripes of one wall (the focus shift over the slope of the wall: the
+surest), the distance between the walls (only roughly, for a vertical cut moves them apart), and on which side of the
+glass edge each must lie.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from gramoscope.apparatus.bench import Bench
+from gramoscope.conventions import INNER, OUTER, row_of_lateral_px
+from gramoscope.microscope.focus import stripe_distance_from_middle_m
+from gramoscope.pickup.hough import Line
+
+WRONG_SIDE = 0.25
+"""What a line on the wrong side of the glass edge counts: the edge is known only roughly."""
+
+
+@dataclass(frozen=True)
+class Stripe:
+    """A stripe that the bench leads us to expect.
+
+    Attributes
+    ----------
+    wall : int
+        `INNER` or `OUTER`.
+    depth_below_land_m : float
+        Where the wall is sharp.
+    row : float
+        Canonical row, for a groove at rest in the middle of the picture.
+    through_glass : bool
+    """
+
+    wall: int
+    depth_below_land_m: float
+    row: float
+    through_glass: bool
+
+
+def expected_stripes(bench: Bench) -> tuple[Stripe, ...]:
+    """Return the stripes that a bench shows, by rising row: three with a cover glass, two without."""
+    glass = bench.cover_glass
+    places = [(wall, bench.focus_through_glass_m, glass is not None) for wall in (OUTER, INNER)]
+    if glass is not None:
+        places.append((INNER if glass.side == "low" else OUTER, bench.focus_below_land_m, False))
+
+    def row(wall: int, depth_m: float) -> float:
+        distance = stripe_distance_from_middle_m(
+            depth_m, groove_width_m=bench.disc.groove_width_m, wall_angle_rad=bench.disc.wall_angle_rad
+        )
+        lateral_m = distance if wall == INNER else -distance
+        sensor = bench.sensor
+        return float(row_of_lateral_px(lateral_m, height_px=sensor.height_px, pixel_pitch_m=sensor.pixel_pitch_m))
+
+    stripes = (Stripe(wall, depth_m, row(wall, depth_m), through) for wall, depth_m, through in places)
+    return tuple(sorted(stripes, key=lambda stripe: stripe.row))
+
+
+@dataclass(frozen=True)
+class StripeModel:
+    """How lines are given their roles.
+
+    Parameters
+    ----------
+    same_wall_tolerance : float
+        How far the distance of two stripes of one wall may be off, as a share of the expected distance.
+    other_wall_tolerance : float
+        The same for stripes of opposite walls.
+    slope_tolerance : float
+        Largest difference between the slopes of two stripes of one wall.
+    edge_margin_px : float
+        How far beyond the glass edge a stripe is still believed.
+    """
+
+    same_wall_tolerance: float = 0.15
+    other_wall_tolerance: float = 0.5
+    slope_tolerance: float = 0.09
+    edge_margin_px: float = 40.0
+
+    def assign(
+        self, lines: Sequence[Line], stripes: Sequence[Stripe], *, edge_row: float | None, glass_low: bool
+    ) -> list[Line | None]:
+        """Give each stripe its line, at least two of them, where that can be done.
+
+        Parameters
+        ----------
+        lines : sequence of Line
+            Candidates from one stretch.
+        stripes : sequence of Stripe
+            By rising row.
+        edge_row : float or None
+            Row of the glass edge, None without a glass.
+        glass_low : bool
+            Whether the glass covers the rows below its edge.
+
+        Returns
+        -------
+        list of Line or None
+            One for each stripe: the combination with the most votes that fits; all None when none fits.
+        """
+        ordered = sorted(lines, key=lambda line: line.row_at(line.column_origin))
+        best: tuple[float, list[Line | None]] = (0.0, [None] * len(stripes))
+        for chosen, roles in _combinations(ordered, len(stripes)):
+            score = self._score(chosen, [stripes[role] for role in roles], edge_row, glass_low)
+            if score > best[0]:
+                places: list[Line | None] = [None] * len(stripes)
+                for line, role in zip(chosen, roles, strict=True):
+                    places[role] = line
+                best = (score, places)
+        return best[1]
+
+    def _score(
+        self, lines: Sequence[Line], stripes: Sequence[Stripe], edge_row: float | None, glass_low: bool
+    ) -> float:
+        rows = [float(line.row_at(line.column_origin)) for line in lines]
+        fit = 1.0
+        for i, j in combinations(range(len(lines)), 2):
+            fit *= self._pair_fit(rows[j] - rows[i], lines[i], lines[j], stripes[i], stripes[j])
+        votes = 0.0
+        for row, line, stripe in zip(rows, lines, stripes, strict=True):
+            votes += line.votes * self._side_fit(row, stripe, edge_row, glass_low)
+        return fit * votes
+
+    def _pair_fit(self, distance_px: float, a: Line, b: Line, one: Stripe, other: Stripe) -> float:
+        expected = other.row - one.row
+        same_wall = one.wall == other.wall
+        tolerance = self.same_wall_tolerance if same_wall else self.other_wall_tolerance
+        off = abs(distance_px / expected - 1) / tolerance
+        if off > 1 or (same_wall and abs(a.slope - b.slope) > self.slope_tolerance):
+            return 0.0
+        return float(np.exp(-0.5 * off**2))
+
+    def _side_fit(self, row: float, stripe: Stripe, edge_row: float | None, glass_low: bool) -> float:
+        if edge_row is None:
+            return 1.0
+        under_glass_px = (edge_row - row) if glass_low else (row - edge_row)
+        beyond = -under_glass_px if stripe.through_glass else under_glass_px
+        return WRONG_SIDE if beyond > self.edge_margin_px else 1.0
+
+
+def _combinations(lines: Sequence[Line], roles: int) -> Iterator[tuple[tuple[Line, ...], tuple[int, ...]]]:
+    """All ways to give two or more roles to lines, both in rising order."""
+    for size in range(2, roles + 1):
+        for chosen in combinations(lines, size):
+            for places in combinations(range(roles), size):
+                yield chosen, places
