@@ -1,6 +1,7 @@
 """The equaliser as a part: pieces, flags, error bars, arguments."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -29,7 +30,7 @@ def a_sound(count=4001, *, start=7):
 
 def cut(sound, *places):
     edges = [0, *places, sound.samples.size]
-    for a, b in zip(edges, edges[1:], strict=False):
+    for a, b in pairwise(edges):
         yield replace(
             sound,
             start_sample=sound.start_sample + a,
@@ -41,7 +42,7 @@ def cut(sound, *places):
 
 def joined(pieces):
     pieces = list(pieces)
-    for before, after in zip(pieces, pieces[1:], strict=False):
+    for before, after in pairwise(pieces):
         assert after.start_sample == before.start_sample + before.samples.size
     return replace(
         pieces[0],

@@ -1,6 +1,7 @@
 """Place → time, against sounds whose closed form is known on a spiral."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -36,7 +37,7 @@ def motion_of(signal, *, start_m=-7.3e-6, step_m=STEP_M, length_m=0.083, rotatio
 
 def cut(motion, *places):
     edges = [0, *places, motion.flags.size]
-    for a, b in zip(edges, edges[1:], strict=False):
+    for a, b in pairwise(edges):
         yield GrooveMotion(
             motion.arc_start_m + a * motion.arc_step_m,
             motion.arc_step_m,
@@ -51,7 +52,7 @@ def cut(motion, *places):
 def joined(pieces):
     pieces = list(pieces)
     assert pieces[0].start_sample == 0
-    for before, after in zip(pieces, pieces[1:], strict=False):
+    for before, after in pairwise(pieces):
         assert after.start_sample == before.start_sample + before.samples.size
     return replace(
         pieces[0],
