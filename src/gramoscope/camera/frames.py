@@ -16,6 +16,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from gramoscope.camera.grey import fit_to_bits, grey_of_colour
 from gramoscope.camera.sensor import Sensor
 from gramoscope.conventions import mirror
 from gramoscope.signal_path import ImageArray
@@ -58,56 +59,6 @@ class FrameSource(Protocol):
 
     def any_frame(self) -> bool:
         """Tell cheaply whether there is anything to read at all."""
-
-
-def grey_of_colour(frame: npt.NDArray[np.unsignedinteger[Any]]) -> npt.NDArray[np.unsignedinteger[Any]]:
-    """Return the rounded mean of red, green and blue.
-
-    Parameters
-    ----------
-    frame : unsigned integer array, shape (row, column, channel)
-        One channel (grey), two (grey and opacity), three or four (colour and opacity); opacity is not looked at.
-
-    Returns
-    -------
-    unsigned integer array, shape (row, column), same type
-        (r + g + b + 1) // 3.
-    """
-    if frame.shape[-1] < 3:
-        return frame[..., 0]
-    wide = np.uint16 if frame.dtype.itemsize == 1 else np.uint32
-    total: npt.NDArray[np.unsignedinteger[Any]] = np.add(frame[..., 0], frame[..., 1], dtype=wide)
-    total += frame[..., 2]
-    total += wide(1)
-    total //= wide(3)
-    return total.astype(frame.dtype)
-
-
-def fit_to_bits(
-    frame: npt.NDArray[np.unsignedinteger[Any]], *, bits: int
-) -> tuple[npt.NDArray[np.unsignedinteger[Any]], str | None]:
-    """Return a grey frame on the scale of the camera, and what was odd about it.
-
-    Parameters
-    ----------
-    frame : uint8 or uint16 array
-    bits : int
-        Of the camera, 8 … 16.
-
-    Returns
-    -------
-    array, str or None
-        The frame as it is when its numbers fit. A file with fewer bits than the camera, or with larger numbers than the
-        camera can give, uses the full scale of its own kind of number and is brought to the camera's.
-    """
-    white = 2**bits - 1
-    stored_bits = 8 * frame.dtype.itemsize
-    if stored_bits >= bits and (stored_bits == bits or int(frame.max(initial=0)) <= white):
-        return frame, None
-    full = 2**stored_bits - 1
-    scaled = (frame.astype(np.uint32) * np.uint32(white) + np.uint32(full // 2)) // np.uint32(full)
-    reason = f"values of {stored_bits} bits where capture.toml says {bits}: scaled to {bits} bits"
-    return scaled.astype(np.uint8 if bits == 8 else np.uint16), reason
 
 
 class Unusable(str):
