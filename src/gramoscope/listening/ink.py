@@ -1,0 +1,104 @@
+"""The look of our pictures: colours that the colour-blind can tell apart, thin axes, units on every axis.
+
+Colours are those of M. Okabe and K. Ito, Color Universal Design, 2008. Nothing global is touched: every setting goes to the
+axes it concerns.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from gramoscope.conventions import FloatArray
+from gramoscope.listening.whole_file import written_whole
+
+BLACK = "#1b1b1f"
+GREY = "#8a8d93"
+PALE = "#e6e7ea"
+BLUE = "#0072b2"
+SKY = "#56b4e9"
+ORANGE = "#e69f00"
+VERMILLION = "#d55e00"
+YELLOW = "#f0e442"
+PURPLE = "#cc79a7"
+
+DOTS_PER_INCH = 150
+DOTS_ACROSS = 1400
+"""Width of the data area of our figures; more samples than this are drawn by their extremes."""
+SMALL = 8.5
+MEDIUM = 10.0
+LARGE = 13.0
+
+
+def blank_figure(width_in: float, height_in: float) -> Figure:
+    """Return an empty white figure that arranges its axes by itself."""
+    return Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, layout="constrained", facecolor="white")
+
+
+def dress(axes: Axes, *, x: str, y: str, grid: bool = True) -> None:
+    """Give axes their labels and the common look.
+
+    Parameters
+    ----------
+    axes : Axes
+    x, y : str
+        Labels with their units.
+    grid : bool
+        Whether faint lines are drawn behind the data.
+    """
+    axes.set_xlabel(x, fontsize=MEDIUM, color=BLACK)
+    axes.set_ylabel(y, fontsize=MEDIUM, color=BLACK)
+    axes.tick_params(labelsize=SMALL, color=GREY, labelcolor=BLACK, length=3)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        axes.spines[side].set_color(GREY)
+    if grid:
+        axes.grid(True, color=PALE, linewidth=0.7)
+        axes.set_axisbelow(True)
+
+
+def heading(axes: Axes, text: str) -> None:
+    """Write a heading above axes, at their left edge."""
+    axes.set_title(text, loc="left", fontsize=MEDIUM, color=BLACK, fontweight="bold", pad=7)
+
+
+def legend_above(axes: Axes, *, columns: int) -> None:
+    """List what is drawn in one line above axes, at their right edge."""
+    axes.legend(
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        ncols=columns,
+        fontsize=SMALL,
+        frameon=False,
+        labelcolor=BLACK,
+        borderaxespad=0.1,
+        columnspacing=1.4,
+        handlelength=1.8,
+    )
+
+
+def readable_time(time_s: FloatArray) -> tuple[FloatArray, str]:
+    """Time in the unit that suits its span, and the unit's name."""
+    return (time_s, "s") if len(time_s) and time_s[-1] - time_s[0] > 1 else (1e3 * time_s, "ms")
+
+
+def save_png(figure: Figure, path: str | os.PathLike[str]) -> None:
+    """Write a figure as a PNG file that appears whole or not at all; equal figures give equal bytes.
+
+    Parameters
+    ----------
+    figure : Figure
+    path : path
+        The folder must exist.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    with written_whole(Path(path)) as temporary:
+        figure.savefig(temporary, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
