@@ -24,34 +24,37 @@ OVERSAMPLING = 4
 LOWEST_HZ = 20.0
 """No cutting head follows slower movements; without this limit the groove would wander off with any offset of the sound."""
 FADE_S = 2e-3
+SETTLING_S = 0.1
+"""How long the head swings before and after the sound: the limit at `LOWEST_HZ` works without delay, both ways in time."""
 
 
 @dataclass(frozen=True, eq=False)
 class Cutting:
-    """The stylus's path in time: velocity and displacement, lateral and vertical, with silence before and after.
+    """The stylus's path in time: velocity and displacement, lateral and vertical, at rest before and after.
 
     Attributes
     ----------
-    seconds : float
-        Length of the sound; it begins at time 0.
+    start_s, stop_s : float
+        When the stylus begins and ceases to move; the sound itself begins at time 0.
     velocity_m_s, displacement_m : pair of piecewise polynomials of time
         Lateral first. `cut_sound` makes them.
     """
 
-    seconds: float
+    start_s: float
+    stop_s: float
     velocity_m_s: tuple[PPoly, PPoly]
     displacement_m: tuple[PPoly, PPoly]
 
     def velocity_at(self, time_s: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return lateral and vertical velocity, m/s; zero outside the sound."""
+        """Return lateral and vertical velocity, m/s; zero while the stylus is at rest."""
         time = np.asarray(time_s, np.float64)
-        playing = (time >= 0) & (time <= self.seconds)
-        lateral, vertical = (np.where(playing, spline(time), 0.0) for spline in self.velocity_m_s)
+        moving = (time >= self.start_s) & (time <= self.stop_s)
+        lateral, vertical = (np.where(moving, spline(time), 0.0) for spline in self.velocity_m_s)
         return lateral, vertical
 
     def displacement_at(self, time_s: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return lateral and vertical displacement, metres; constant outside the sound."""
-        time = np.clip(np.asarray(time_s, np.float64), 0, self.seconds)
+        """Return lateral and vertical displacement, metres; constant while the stylus is at rest."""
+        time = np.clip(np.asarray(time_s, np.float64), self.start_s, self.stop_s)
         lateral, vertical = (np.asarray(spline(time)) for spline in self.displacement_m)
         return lateral, vertical
 
@@ -83,13 +86,15 @@ def cut_sound(sound: FloatArray, *, rate_hz: float, level_m_s: float, cut: Cut) 
     sound = np.asarray(sound, np.float64)
     _check_sound(sound, rate_hz=rate_hz, level_m_s=level_m_s)
     lateral, vertical = _motion(sound, cut=cut)
-    motion = np.stack([lateral, vertical], axis=1)
     fine_rate_hz = rate_hz * OVERSAMPLING
-    fine = soxr.resample(motion, rate_hz, fine_rate_hz, quality="VHQ")
-    fine = _fade(_without_wander(fine, rate_hz=fine_rate_hz), rate_hz=fine_rate_hz)
-    strength = float(np.sqrt(np.mean(np.sum(fine**2, axis=1))))
+    fine = soxr.resample(np.stack([lateral, vertical], axis=1), rate_hz, fine_rate_hz, quality="VHQ")
+    length = len(fine)
+    room = int(SETTLING_S * fine_rate_hz)
+    fine = np.pad(_fade(fine, rate_hz=fine_rate_hz), ((room, room), (0, 0)))
+    fine = _without_wander(fine, rate_hz=fine_rate_hz)
+    strength = float(np.sqrt(np.sum(fine**2) / length))
     require(strength > 0, "the sound has nothing above 20 Hz", "a sound with some signal")
-    return _path(fine * (level_m_s / strength), rate_hz=fine_rate_hz)
+    return _path(fine * (level_m_s / strength), rate_hz=fine_rate_hz, start_s=-room / fine_rate_hz)
 
 
 def _check_sound(sound: FloatArray, *, rate_hz: float, level_m_s: float) -> None:
@@ -114,8 +119,7 @@ def _motion(sound: FloatArray, *, cut: Cut) -> tuple[FloatArray, FloatArray]:
 
 def _without_wander(motion: FloatArray, *, rate_hz: float) -> FloatArray:
     high_pass = butter(2, LOWEST_HZ, "highpass", fs=rate_hz, output="sos")
-    room = min(len(motion) - 1, int(rate_hz / LOWEST_HZ))
-    return np.asarray(sosfiltfilt(high_pass, motion, axis=0, padlen=room), np.float64)
+    return np.asarray(sosfiltfilt(high_pass, motion, axis=0, padtype=None), np.float64)
 
 
 def _fade(motion: FloatArray, *, rate_hz: float) -> FloatArray:
@@ -128,19 +132,12 @@ def _fade(motion: FloatArray, *, rate_hz: float) -> FloatArray:
     return np.asarray(motion * window[:, None], np.float64)
 
 
-def _path(velocity_m_s: FloatArray, *, rate_hz: float) -> Cutting:
-    time_s = np.arange(len(velocity_m_s)) / rate_hz
-    velocity = tuple(CubicSpline(time_s, velocity_m_s[:, axis]) for axis in (0, 1))
-    displacement = tuple(_centred(spline.antiderivative(), time_s) for spline in velocity)
+def _path(velocity_m_s: FloatArray, *, rate_hz: float, start_s: float) -> Cutting:
+    time_s = start_s + np.arange(len(velocity_m_s)) / rate_hz
+    lateral, vertical = (CubicSpline(time_s, velocity_m_s[:, axis]) for axis in (0, 1))
     return Cutting(
-        seconds=float(time_s[-1]),
-        velocity_m_s=(velocity[0], velocity[1]),
-        displacement_m=(displacement[0], displacement[1]),
+        start_s=float(time_s[0]),
+        stop_s=float(time_s[-1]),
+        velocity_m_s=(lateral, vertical),
+        displacement_m=(lateral.antiderivative(), vertical.antiderivative()),
     )
-
-
-def _centred(displacement: PPoly, time_s: FloatArray) -> PPoly:
-    """Shift a displacement so that the groove winds about its middle."""
-    coefficients = displacement.c.copy()
-    coefficients[-1] -= displacement(time_s).mean()
-    return PPoly(coefficients, displacement.x)

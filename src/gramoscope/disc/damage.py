@@ -65,9 +65,9 @@ class Scratch:
 
     def spoil(self, height_m: Picture, albedo: Picture, arc_m: FloatArray, lateral_m: FloatArray) -> None:
         """Plough the line into a patch of surface."""
-        s, l = arc_m - self.centre_m[0], lateral_m - self.centre_m[1]
+        ahead, left = arc_m - self.centre_m[0], lateral_m - self.centre_m[1]
         cosine, sine = np.cos(self.angle_rad), np.sin(self.angle_rad)
-        along, beside = s * cosine + l * sine, l * cosine - s * sine
+        along, beside = ahead * cosine + left * sine, left * cosine - ahead * sine
         past_end = np.maximum(np.abs(along) - self.length_m / 2, 0)
         profile = np.exp(-(beside**2 + past_end**2) / self.width_m**2)
         height_m -= (self.depth_m * profile).astype(np.float32)
@@ -92,12 +92,12 @@ class Chip:
 
     def spoil(self, height_m: Picture, albedo: Picture, arc_m: FloatArray, lateral_m: FloatArray) -> None:
         """Break the piece out of a patch of surface."""
-        s, l = arc_m - self.centre_m[0], lateral_m - self.centre_m[1]
+        ahead, left = arc_m - self.centre_m[0], lateral_m - self.centre_m[1]
         ragged, coarse, fine = (
-            _roughness(s, l, cell_m=cell_m, seed=self.seed + i) for i, cell_m in enumerate((14e-6, 9e-6, 2.5e-6))
+            _roughness(ahead, left, cell_m=cell_m, seed=self.seed + i) for i, cell_m in enumerate((14e-6, 9e-6, 2.5e-6))
         )
         # a superellipse is nearly a rectangle with round corners
-        inside = 1 - (2 * s / self.length_m) ** 4 - (2 * l / self.width_m) ** 4 + 0.35 * ragged
+        inside = 1 - (2 * ahead / self.length_m) ** 4 - (2 * left / self.width_m) ** 4 + 0.35 * ragged
         missing = 1 / (1 + np.exp(-np.clip(12 * inside, -40, 40)))
         height_m -= (missing * self.depth_m * np.maximum(0.2, 1 + 0.5 * coarse + 0.1 * fine)).astype(np.float32)
         albedo *= (1 + missing * (self.tint * np.maximum(0.1, 1 + 0.3 * coarse + 0.25 * fine) - 1)).astype(np.float32)
@@ -121,9 +121,9 @@ class Dust:
 
     def spoil(self, height_m: Picture, albedo: Picture, arc_m: FloatArray, lateral_m: FloatArray) -> None:
         """Lay the speck on a patch of surface."""
-        s, l = arc_m - self.centre_m[0], lateral_m - self.centre_m[1]
+        ahead, left = arc_m - self.centre_m[0], lateral_m - self.centre_m[1]
         cosine, sine = np.cos(self.angle_rad), np.sin(self.angle_rad)
-        along, beside = (s * cosine + l * sine) / self.elongation, l * cosine - s * sine
+        along, beside = (ahead * cosine + left * sine) / self.elongation, left * cosine - ahead * sine
         around = np.arctan2(beside, along)
         outline = self.radius_m * (1 + 0.2 * np.cos(2 * around + self.angle_rad) + 0.1 * np.cos(5 * around))
         closeness = np.clip(1 - (along**2 + beside**2) / outline**2, 0, 1)
@@ -254,10 +254,10 @@ def _dust(rng: np.random.Generator, tile: int, middle_m: float) -> Dust:
     )
 
 
-def _roughness(s_m: FloatArray, l_m: FloatArray, *, cell_m: float, seed: int) -> FloatArray:
+def _roughness(ahead_m: FloatArray, left_m: FloatArray, *, cell_m: float, seed: int) -> FloatArray:
     """Return a smooth random field of about unit size, fixed to the record, at the crossings of s and l."""
     rng = np.random.default_rng(seed)
     cells = int(np.ceil(REACH_M / cell_m)) + 2
     grid = rng.standard_normal((2 * cells, 2 * cells))
-    rows, columns = np.broadcast_arrays(l_m / cell_m + cells, s_m / cell_m + cells)
+    rows, columns = np.broadcast_arrays(left_m / cell_m + cells, ahead_m / cell_m + cells)
     return np.asarray(map_coordinates(grid, np.stack([rows, columns]), order=3, mode="nearest"), np.float64)

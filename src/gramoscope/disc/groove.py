@@ -146,7 +146,7 @@ def section(x: float, shape: FloatArray) -> tuple[float, float, float]:
 def _heights(across_m: FloatArray, lift_m: FloatArray, shape: FloatArray) -> FloatArray:
     across, lift = np.broadcast_arrays(across_m, lift_m)
     walls = _section_heights(np.ascontiguousarray(across).ravel(), shape).reshape(across.shape)
-    return np.minimum(walls + lift, 0.0)
+    return np.asarray(np.minimum(walls + lift, 0.0))
 
 
 @numba.njit(cache=True, nogil=True)

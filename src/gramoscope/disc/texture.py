@@ -13,6 +13,7 @@ further than walls and bottom reach.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numba
 import numpy as np
@@ -80,9 +81,9 @@ class Texture:
         return _grained(noise, taps, np.float32(self.skewness), np.float32(self.contrast))
 
 
-POWDER = Texture(grain_m=1.0e-6, contrast=0.42, skewness=0.9)
+POWDER = Texture(grain_m=1.2e-6, contrast=0.55, skewness=0.8)
 """Aluminium powder of about a micrometre (paper, section 1): strong contrast. Strength and skewness are chosen by eye."""
-SHELLAC = Texture(grain_m=0.8e-6, contrast=0.18, skewness=0.5)
+SHELLAC = Texture(grain_m=0.8e-6, contrast=0.22, skewness=0.5)
 """The mineral filler of natural shellac: finer and weaker. A guess."""
 POLISHED = Texture(grain_m=1.2e-6, contrast=0.05, skewness=0.3)
 """A wall that has hardly any texture left. A guess."""
@@ -167,7 +168,7 @@ def sample_across(field: Field, along_m: FloatArray, *, pitch_m: float) -> Field
 
 
 @numba.njit(cache=True, nogil=True)
-def catmull_rom(t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def catmull_rom(t: Any) -> tuple[Any, Any, Any, Any]:
     """Return the weights of the four neighbours at the fraction 0 ≤ t < 1 between the second and the third (any shape)."""
     return (
         0.5 * t * (-1 + t * (2 - t)),

@@ -150,7 +150,9 @@ def blur(light: Picture, radius_px: Picture, slope_tan: Picture, *, floor_px: fl
         NaN where no source sends any light.
     """
     energy = scatter(light, radius_px, slope_tan, floor_px=floor_px, margin_px=margin_px)
-    return np.divide(energy[0], energy[1], out=np.full_like(energy[0], np.nan), where=energy[1] > 0)
+    picture: Picture = np.full_like(energy[0], np.nan)
+    np.divide(energy[0], energy[1], out=picture, where=energy[1] > 0)
+    return picture
 
 
 def split(light: Picture, radius_px: Picture, slope_tan: Picture, floor_px: np.float32) -> tuple[Sources, Sources]:

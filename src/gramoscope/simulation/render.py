@@ -58,11 +58,11 @@ def render_group(scene: Scene, passage: Passage, number: int) -> ImageArray:
     field = field_of(scene)
     start_px = filmed.arc_start_m / scene.bench.sensor.pixel_pitch_m - first_column
     seeds = np.random.SeedSequence([scene.seed, NOISE_STREAM, number]).generate_state(len(start_px), np.uint64)
-    frames = [
-        _frame(scene, picture, field * np.float32(light), start, int(seed))
-        for start, light, seed in zip(start_px, filmed.light, seeds, strict=True)
-    ]
-    return np.stack(frames)
+    sensor = scene.bench.sensor
+    images = np.empty((len(start_px), sensor.height_px, sensor.width_px), sensor.dtype)
+    for image, start, light, seed in zip(images, start_px, filmed.light, seeds, strict=True):
+        image[:] = _frame(scene, picture, field * np.float32(light), start, int(seed))
+    return images
 
 
 def noise_free_strip(scene: Scene, passage: Passage, filmed: FilmedGroup) -> tuple[Field, int]:

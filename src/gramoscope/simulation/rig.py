@@ -71,7 +71,7 @@ class Rig:
         require(self.focus_drift_groups > 0, f"a drift over {self.focus_drift_groups} groups", "a positive number")
         require(self.dim > 0, f"{self.dim} of the light", "a positive share")
         shares = (self.black_share, self.saturated_share, self.lost_share)
-        require(0 <= min(shares) and max(shares) <= 1, f"shares of groups {shares}", "0 … 1")
+        require(min(shares) >= 0 and max(shares) <= 1, f"shares of groups {shares}", "0 … 1")
 
     def surface_height_m(self, arc_m: npt.ArrayLike) -> FloatArray:
         """Return how high the warp lifts the record at the places s."""
@@ -101,7 +101,8 @@ class Rig:
         light[victims[1]] *= 0.0 if black else 1.0
         return FilmedGroup(
             arc_start_m=start_m + np.concatenate([[0.0], np.cumsum(step_m)]),
-            nominal_start_m=number * sequence.group_step_m + np.arange(frames) * sequence.frame_step_m,
+            nominal_start_m=number * sequence.group_step_m
+            + np.arange(frames, dtype=np.float64) * sequence.frame_step_m,
             stage_m=float(self.stage_wander_m * stage),
             focus_error_m=float(self.focus_drift_m * np.sin(np.pi / 2 * number / self.focus_drift_groups)),
             light=light,

@@ -54,7 +54,7 @@ def surface_strip(
         Radial position of the microscope.
     """
     sensor = scene.bench.sensor
-    arc_m = np.arange(first_column, first_column + columns) * sensor.pixel_pitch_m
+    arc_m = np.arange(first_column, first_column + columns, dtype=np.float64) * sensor.pixel_pitch_m
     rows = np.arange(-margin_px, sensor.height_px + margin_px)
     lateral_m = lateral_of_row_m(rows, height_px=sensor.height_px, pixel_pitch_m=sensor.pixel_pitch_m, stage_m=stage_m)
     height_m, light = _clean_surface(scene, passage, first_column, arc_m, lateral_m)
@@ -126,7 +126,7 @@ def _shade(z: float, slope_s: float, slope_l: float, lamps: FloatArray) -> float
     """Return the brightness of a tilted surface; `Illumination.brightness` in scalar form."""
     upright = 1 / np.sqrt(1 + slope_s * slope_s + slope_l * slope_l)
     facing = max(0.0, upright * (1 - slope_s * lamps[3] - slope_l * lamps[4]))
-    return (lamps[0] + lamps[1] * upright + lamps[2] * facing) * max(0.0, 1 + lamps[6] * z)
+    return float((lamps[0] + lamps[1] * upright + lamps[2] * facing) * max(0.0, 1 + lamps[6] * z))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -136,4 +136,4 @@ def _albedo(texture: Field, place: float, column: int) -> float:
     row = floor + ACROSS // 2
     before, here, there, beyond = catmull_rom(place - floor)
     total = before * texture[(row - 1) % ACROSS, column] + here * texture[row % ACROSS, column]
-    return total + there * texture[(row + 1) % ACROSS, column] + beyond * texture[(row + 2) % ACROSS, column]
+    return float(total + there * texture[(row + 1) % ACROSS, column] + beyond * texture[(row + 2) % ACROSS, column])
