@@ -29,7 +29,7 @@ def grey_of_colour(frame: ImageArray) -> ImageArray:
     if frame.shape[-1] < 3:
         return frame[..., 0]
     grey = cast(ImageArray, np.empty(frame.shape[:2], frame.dtype))
-    _mean_of_colours(np.ascontiguousarray(frame), grey)
+    _mean_of_colours(cast(ImageArray, np.ascontiguousarray(frame)), grey)
     return grey
 
 

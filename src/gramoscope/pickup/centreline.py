@@ -66,3 +66,32 @@ def fill_voids(row: FloatArray, line_row: FloatArray) -> Centreline:
     """
     measured = np.isfinite(row)
     return Centreline(np.where(measured, row, line_row), measured)
+
+
+def discard_damaged_columns(
+    label: npt.NDArray[np.int64], columns: npt.NDArray[np.int64], *, width: int, most_outside: int = 12, margin_px: int = 4
+) -> npt.NDArray[np.int64]:
+    """Set aside the points of columns in which damage runs across the stripes.
+
+    The rim of a chip or a scratch across the groove is a vertical line of sharp points. The Hough transform ignores it,
+    but where it crosses a stripe its points lie in the region of the peak and pull the centroid to the line.
+
+    Parameters
+    ----------
+    label : int array, shape (point,)
+        Stripe of each point, negative outside the regions.
+    columns : int array, shape (point,)
+    width : int
+    most_outside : int
+        A column with more points than this outside all regions is damaged.
+    margin_px : int
+        So are its neighbours, so far to either side.
+
+    Returns
+    -------
+    int array, shape (point,)
+        −3 for the points in damaged columns.
+    """
+    outside = np.bincount(columns[label == -1], minlength=width)
+    damaged = np.convolve(outside > most_outside, np.ones(2 * margin_px + 1, np.int64), "same") > 0
+    return np.where(damaged[columns], -3, label)

@@ -111,7 +111,7 @@ def _windowed(votes: IntArray, window_px: int) -> FloatArray:
 
 
 def peaks(
-    accumulator: Accumulator, *, count: int, separation_px: float, window_px: int = 7, least_share: float = 0.1
+    accumulator: Accumulator, *, count: int, separation_px: float, window_px: int = 7, least_share: float = 0.2
 ) -> list[Line]:
     """Return the strongest lines, strongest first.
 

@@ -33,7 +33,7 @@ class InFocus:
         Largest flow that remains after registration, along the groove and across it, pixels a frame.
     """
 
-    contrast_share: float = 0.8
+    contrast_share: float = 0.6
     background_share: float = 5.0
     flow_tolerance_px: float = 0.5
 

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from gramoscope.apparatus.bench import Bench
 from gramoscope.conventions import INNER, OUTER, FloatArray, lateral_of_row_m, rad
 from gramoscope.errors import require
-from gramoscope.pickup.centreline import Centreline, centroids, fill_voids
+from gramoscope.pickup.centreline import Centreline, centroids, discard_damaged_columns, fill_voids
 from gramoscope.pickup.exposure import Exposure
 from gramoscope.pickup.flow.derivatives import Derivatives, group_derivatives, texture_contrast
 from gramoscope.pickup.flow.horn_schunck import Flow, FlowMethod, GrooveHornSchunck
@@ -32,6 +32,8 @@ from gramoscope.signal_path import FrameGroup, Texture, WallTrace
 
 IntArray = npt.NDArray[np.int64]
 CANDIDATE_LINES = 6
+NEARLY_WHITE = 0.97
+"""Points brighter than this share of full scale are burnt out: their texture is the camera's."""
 TEXTURE_REACH_PX = 40
 """How far, beyond the nominal overlap, the strips reach that neighbouring stretches are matched by."""
 
@@ -111,7 +113,7 @@ class Reading:
     point_row, point_column : int arrays, shape (point,)
         In-focus points.
     label : int array, shape (point,)
-        Number of the stripe; −1 in no region, −2 disputed.
+        Number of the stripe; −1 in no region, −2 disputed, −3 in a damaged column.
     segments : list of SegmentReading
     stripes : tuple of Stripe
         As expected from the bench.
@@ -157,7 +159,7 @@ class SeedPaperPickup:
 
     bench: Bench
     flow: FlowMethod = field(default_factory=GrooveHornSchunck)
-    smoothing_px: float = 1.5
+    smoothing_px: float = 1.0
     exposure: Exposure = field(default_factory=Exposure)
     in_focus: InFocus = field(default_factory=InFocus)
     hough: HoughSearch = field(default_factory=HoughSearch)
@@ -196,10 +198,12 @@ class SeedPaperPickup:
         contrast = texture_contrast(raw.x)
         derivatives = raw.scaled(1 / contrast if contrast > 0 else 0.0)
         flow = self._flow(derivatives, step_m) if index.size > 1 else None
-        rows, columns = np.nonzero(self.in_focus.mask(derivatives, flow))
+        in_focus = self.in_focus.mask(derivatives, flow) & (canvas.mean < NEARLY_WHITE * group.white_level)
+        rows, columns = np.nonzero(in_focus)
         stripes = expected_stripes(self.bench)
         segments = self._find_lines(rows, columns, stripes, canvas.mean.shape)
         label = self._label(rows, columns, segments)
+        label = discard_damaged_columns(label, columns, width=canvas.mean.shape[1])
         weights = derivatives.x[rows, columns].astype(np.float64) ** 2
         lines = [
             self._centreline(number, rows, columns, weights, label, segments, canvas.mean.shape[1])
@@ -231,26 +235,30 @@ class SeedPaperPickup:
         self, rows: IntArray, columns: IntArray, stripes: tuple[Stripe, ...], shape: tuple[int, ...]
     ) -> list[SegmentReading]:
         borders = np.linspace(0, shape[1], self.hough.segments + 1).astype(int)
-        found = []
+        glass = self.bench.cover_glass
+        accumulators, candidates, assignments = [], [], []
         for start, stop in zip(borders[:-1], borders[1:], strict=True):
             inside = (columns >= start) & (columns < stop)
-            accumulator = accumulate(
+            votes = accumulate(
                 rows[inside],
                 columns[inside],
                 row_origin=(shape[0] - 1) / 2,
                 column_origin=(start + stop - 1) / 2,
                 theta_rad=self.hough.theta_rad,
             )
-            candidates = peaks(accumulator, count=CANDIDATE_LINES, separation_px=self.hough.separation_px)
-            glass = self.bench.cover_glass
-            lines = self.stripe_model.assign(
-                candidates,
-                stripes,
-                edge_row=self.bench.glass_edge_row if glass else None,
-                glass_low=glass is not None and glass.side == "low",
+            lines = peaks(votes, count=CANDIDATE_LINES, separation_px=self.hough.separation_px)
+            edge_row = self.bench.glass_edge_row if glass else None
+            glass_low = glass is not None and glass.side == "low"
+            assignments.append(self.stripe_model.assignments(lines, stripes, edge_row=edge_row, glass_low=glass_low))
+            accumulators.append(votes)
+            candidates.append(lines)
+        path = self.stripe_model.path(assignments, [float(b) for b in borders[1:-1]], stripes)
+        return [
+            SegmentReading(int(start), int(stop), votes, lines, list(chosen.lines))
+            for start, stop, votes, lines, chosen in zip(
+                borders[:-1], borders[1:], accumulators, candidates, path, strict=True
             )
-            found.append(SegmentReading(int(start), int(stop), accumulator, candidates, lines))
-        return found
+        ]
 
     def _label(self, rows: IntArray, columns: IntArray, segments: list[SegmentReading]) -> IntArray:
         label = np.full(rows.size, -1, np.int64)
@@ -334,7 +342,7 @@ class SeedPaperPickup:
             offset_sigma_m=offset_sigma,
             slope=slope,
             slope_sigma=slope_sigma,
-            correlation_samples=self.orientation.neighbourhood_px / self.orientation.stride_px,
+            correlation_samples=self.orientation.correlation_samples,
             flags=wall_flags,
             frame_step_m=step_m,
             problems=group.problems,

@@ -22,6 +22,8 @@ from gramoscope.pickup.hough import Line
 
 WRONG_SIDE = 0.25
 """What a line on the wrong side of the glass edge counts: the edge is known only roughly."""
+KEPT_ASSIGNMENTS = 24
+"""So many ways to read a segment are weighed against those of its neighbours."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,30 @@ def expected_stripes(bench: Bench) -> tuple[Stripe, ...]:
 
 
 @dataclass(frozen=True)
+class Assignment:
+    """One way in which the lines of a segment can be the expected stripes.
+
+    Attributes
+    ----------
+    score : float
+        Votes of the lines, less where they fit badly.
+    lines : tuple of Line or None
+        One for each stripe.
+    """
+
+    score: float
+    lines: tuple[Line | None, ...]
+
+    def middle_at(self, column: float, stripes: Sequence[Stripe]) -> float:
+        """Return how many rows the groove lies off the expected place at a column; NaN without lines."""
+        found = [(line, stripe) for line, stripe in zip(self.lines, stripes, strict=True) if line is not None]
+        if not found:
+            return float("nan")
+        off = [float(line.row_at(column)) - stripe.row for line, stripe in found]
+        return float(np.average(off, weights=[line.votes for line, _ in found]))
+
+
+@dataclass(frozen=True)
 class StripeModel:
     """How lines are given their roles.
 
@@ -74,26 +100,33 @@ class StripeModel:
         How far the distance of two stripes of one wall may be off, as a share of the expected distance.
     other_wall_tolerance : float
         The same for stripes of opposite walls.
-    slope_tolerance : float
-        Largest difference between the slopes of two stripes of one wall.
+    same_wall_slope_tolerance, other_wall_slope_tolerance : float
+        Largest difference between the slopes of two stripes.
     edge_margin_px : float
         How far beyond the glass edge a stripe is still believed.
+    lone_stripe : float
+        What the votes of a line count that is the only stripe of its segment.
+    largest_jump_px : float
+        How far the middle of the groove may seem to jump between segments.
     """
 
     same_wall_tolerance: float = 0.15
     other_wall_tolerance: float = 0.5
-    slope_tolerance: float = 0.09
+    same_wall_slope_tolerance: float = 0.09
+    other_wall_slope_tolerance: float = 0.25
     edge_margin_px: float = 40.0
+    lone_stripe: float = 0.5
+    largest_jump_px: float = 20.0
 
-    def assign(
+    def assignments(
         self, lines: Sequence[Line], stripes: Sequence[Stripe], *, edge_row: float | None, glass_low: bool
-    ) -> list[Line | None]:
-        """Give each stripe its line, at least two of them, where that can be done.
+    ) -> list[Assignment]:
+        """Return the ways in which the lines of one segment can be the expected stripes.
 
         Parameters
         ----------
         lines : sequence of Line
-            Candidates from one stretch.
+            Candidates from one segment.
         stripes : sequence of Stripe
             By rising row.
         edge_row : float or None
@@ -103,25 +136,66 @@ class StripeModel:
 
         Returns
         -------
-        list of Line or None
-            One for each stripe: the combination with the most votes that fits; all None when none fits.
+        list of Assignment
+            Best first, at most `KEPT_ASSIGNMENTS`.
         """
         ordered = sorted(lines, key=lambda line: line.row_at(line.column_origin))
-        best: tuple[float, list[Line | None]] = (0.0, [None] * len(stripes))
+        found = []
         for chosen, roles in _combinations(ordered, len(stripes)):
             score = self._score(chosen, [stripes[role] for role in roles], edge_row, glass_low)
-            if score > best[0]:
+            if score > 0:
                 places: list[Line | None] = [None] * len(stripes)
                 for line, role in zip(chosen, roles, strict=True):
                     places[role] = line
-                best = (score, places)
-        return best[1]
+                found.append(Assignment(score, tuple(places)))
+        return sorted(found, key=lambda assignment: -assignment.score)[:KEPT_ASSIGNMENTS]
+
+    def path(
+        self, segments: Sequence[Sequence[Assignment]], borders: Sequence[float], stripes: Sequence[Stripe]
+    ) -> list[Assignment]:
+        """Choose one assignment for each segment so that the groove runs on from one to the next.
+
+        Parameters
+        ----------
+        segments : sequence of (sequence of Assignment)
+        borders : sequence of float
+            Column of the border between each two segments.
+        stripes : sequence of Stripe
+
+        Returns
+        -------
+        list of Assignment
+            The sequence with the highest total score in which the middle of the groove nowhere jumps by more than
+            `largest_jump_px` (Viterbi's algorithm); a segment where nothing fits gets an assignment without lines.
+        """
+        nothing = Assignment(0.0, (None,) * len(stripes))
+        choices = [[*found, nothing] for found in segments]
+        total = [assignment.score for assignment in choices[0]]
+        back: list[list[int]] = []
+        for border, before, after in zip(borders, choices[:-1], choices[1:], strict=True):
+            best = [
+                max(range(len(before)), key=lambda i: total[i] if self._runs_on(before[i], to, border, stripes) else -1.0)
+                for to in after
+            ]
+            total = [total[i] + to.score for i, to in zip(best, after, strict=True)]
+            back.append(best)
+        i = int(np.argmax(total))
+        chosen = [choices[-1][i]]
+        for best, before in zip(reversed(back), reversed(choices[:-1]), strict=True):
+            i = best[i]
+            chosen.append(before[i])
+        return chosen[::-1]
+
+    def _runs_on(self, a: Assignment, b: Assignment, column: float, stripes: Sequence[Stripe]) -> bool:
+        jump = a.middle_at(column, stripes) - b.middle_at(column, stripes)
+        # a segment without lines runs on from anything: its middle, and so the jump, is NaN
+        return not abs(jump) > self.largest_jump_px
 
     def _score(
         self, lines: Sequence[Line], stripes: Sequence[Stripe], edge_row: float | None, glass_low: bool
     ) -> float:
         rows = [float(line.row_at(line.column_origin)) for line in lines]
-        fit = 1.0
+        fit = self.lone_stripe if len(lines) == 1 else 1.0
         for i, j in combinations(range(len(lines)), 2):
             fit *= self._pair_fit(rows[j] - rows[i], lines[i], lines[j], stripes[i], stripes[j])
         votes = 0.0
@@ -134,7 +208,8 @@ class StripeModel:
         same_wall = one.wall == other.wall
         tolerance = self.same_wall_tolerance if same_wall else self.other_wall_tolerance
         off = abs(distance_px / expected - 1) / tolerance
-        if off > 1 or (same_wall and abs(a.slope - b.slope) > self.slope_tolerance):
+        slope_tolerance = self.same_wall_slope_tolerance if same_wall else self.other_wall_slope_tolerance
+        if off > 1 or abs(a.slope - b.slope) > slope_tolerance:
             return 0.0
         return float(np.exp(-0.5 * off**2))
 
@@ -147,8 +222,8 @@ class StripeModel:
 
 
 def _combinations(lines: Sequence[Line], roles: int) -> Iterator[tuple[tuple[Line, ...], tuple[int, ...]]]:
-    """All ways to give two or more roles to lines, both in rising order."""
-    for size in range(2, roles + 1):
+    """All ways to give roles to lines, both in rising order."""
+    for size in range(1, roles + 1):
         for chosen in combinations(lines, size):
             for places in combinations(range(roles), size):
                 yield chosen, places

@@ -273,6 +273,16 @@ class WallOrientation:
         require(self.stride_px >= 1, f"a stride of {self.stride_px} pixels", "at least 1")
         require(0 < self.least_share <= 1, f"a least share of {self.least_share}", "above 0, at most 1")
 
+    @property
+    def correlation_samples(self) -> float:
+        """Over how many stations errors count as one and the same: half a neighbourhood.
+
+        The slopes of two neighbourhoods that overlap share errors when they overlap much, and err the opposite way when
+        they overlap little, because a centroid that tilts the one up tilts the other down. Half is what makes the
+        smoothed error bars come out true on rendered grooves (`tests/recovery`).
+        """
+        return max(0.5 * self.neighbourhood_px / self.stride_px, 1.0)
+
     def stations(self, width: int) -> FloatArray:
         """Return the columns at which planes are fitted, for a stretch of some width."""
         return np.arange(0.0, width, self.stride_px)

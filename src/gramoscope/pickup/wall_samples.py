@@ -1,7 +1,8 @@
 """From the planes of one wall to samples with honest errors and flags.
 
 A plane's standard error assumes that columns err independently; neighbouring centroids share texture grains, so it is
-widened by the square root of the correlation length of the residuals. Where too few columns were measured for an
+widened by the square root of the correlation length of the residuals; and since a few points can lie on a line by chance,
+no scatter is believed that is smaller than the median of the stretch. Where too few columns were measured for an
 orientation, the slope of the Hough line stands in, flagged, with an error as large as the music.
 """
 
@@ -81,7 +82,8 @@ def samples_of_wall(
     seen = np.isfinite(planes.slope)
     correlation = correlation_length_px(residuals(planes, rows, measured, stations))
     slope = np.where(seen, planes.slope, line_slope)
-    sigma = np.where(seen, planes.slope_sigma * np.sqrt(correlation), UNSEEN_SLOPE_SIGMA)
+    lucky = np.maximum(np.nanmedian(planes.scatter_px) / planes.scatter_px, 1.0) if seen.any() else 1.0
+    sigma = np.where(seen, planes.slope_sigma * lucky * np.sqrt(correlation), UNSEEN_SLOPE_SIGMA)
     flags = no_flags(stations.size)
     flags[~seen] |= np.uint16(Quality.SPARSE | Quality.INTERPOLATED)
     nothing = ~np.isfinite(slope)

@@ -50,7 +50,7 @@ class KalmanSmoother:
     block_groups: int = 16
     lookahead: float = 20.0
     gate: float = 5.0
-    corner_limits_hz: tuple[float, float] = (200.0, 12000.0)
+    corner_limits_hz: tuple[float, float] = (1000.0, 12000.0)
     floor_m_s: float = 2e-3
 
     def __post_init__(self) -> None:
