@@ -172,11 +172,12 @@ def test_below_the_bass_limit_the_boost_stays_level():
     assert levels[0] - levels[1] == pytest.approx(0, abs=0.1)
 
 
-def test_above_the_audio_band_the_filter_does_not_howl():
+def test_above_the_audio_band_the_filter_goes_on_along_the_curve_and_does_not_howl_at_the_end():
     for curve in CHARACTERISTICS:
         f = np.linspace(20_000, 48_000, 301)
-        ratio = playback_filter(curve, rate_hz=96_000).response(f) / curve.playback_response(f)
-        assert np.max(decibels(ratio)) < 1
+        error = decibels(playback_filter(curve, rate_hz=96_000).response(f) / curve.playback_response(f))
+        assert np.max(np.abs(error[f < 0.9 * 48_000])) < 0.25
+        assert np.max(np.abs(error)) < 1
 
 
 def test_the_rms_gain_is_that_of_white_noise_in_the_audio_band():
@@ -188,6 +189,18 @@ def test_the_rms_gain_is_that_of_white_noise_in_the_audio_band():
     assert undo.rms_gain == pytest.approx(np.std(undo.apply(noise)[90_000:-6_000]) / np.std(noise), rel=0.004)
     closed_form = np.sqrt(np.mean(np.abs(RIAA.playback_response(np.arange(20, 20_000) + 0.5)) ** 2))
     assert undo.rms_gain == pytest.approx(closed_form, rel=1e-4)
+
+
+def test_pieces_give_the_bits_of_the_whole_even_for_a_filter_without_poles():
+    """Cutting with a treble corner alone is all zeros and no poles; a convolution would round by the length of the piece."""
+    cutter = recording_filter(Characteristic("treble", "treble alone", rolloff_hz=3000), rate_hz=48_000)
+    sound = np.random.default_rng(6).standard_normal(3001)
+    state, parts = cutter.at_rest(), []
+    for part in np.split(sound, [5, 5, 700, 701, 2222]):
+        out, state = cutter.advance(part, state)
+        parts.append(out)
+    whole, _ = cutter.advance(sound, cutter.at_rest())
+    np.testing.assert_array_equal(np.concatenate(parts), whole)
 
 
 def test_a_rate_too_low_for_sound_is_refused():

@@ -108,7 +108,7 @@ def noise(time_s):
     return 0.03 * np.random.default_rng(4).standard_normal(time_s.size)
 
 
-@pytest.mark.parametrize("start_m", [-2.9e-4, -1.1e-6, 0.0, 1.7e-6, 9.1e-6])
+@pytest.mark.parametrize("start_m", [-2.9e-4, -1.1e-6, 0.0, 1.7e-6, 9.1e-6, 2.3e-3])
 def test_sample_0_is_s_0_wherever_the_grid_begins(start_m):
     motion = motion_of(lambda t: tone(t, 3000.0), start_m=start_m)
     sound = joined(Resampler(SPIRAL).resample([motion]))

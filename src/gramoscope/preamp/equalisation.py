@@ -61,12 +61,12 @@ class Equaliser:
         undo = playback_filter(self.characteristic, rate_hz=first.rate_hz)
         done = (*first.history, history_line(self.characteristic))
         waiting = replace(_part_of(first, 0, 0), history=done)
-        state, late_by = undo.at_rest(), undo.look_ahead
-        for piece in chain([first], pieces, [_silence(undo.look_ahead, after=first)]):
-            late, state = undo.advance(without_nan(piece).samples, state)
+        state, late_by, gain = undo.at_rest(), undo.look_ahead, undo.rms_gain
+        for piece in map(without_nan, chain([first], pieces, [_silence(undo.look_ahead, after=first)])):
+            late, state = undo.advance(piece.samples, state)
             samples = late[late_by:]
             late_by -= late.size - samples.size
-            waiting = _behind(waiting, replace(without_nan(piece), sigma=piece.sigma * undo.rms_gain))
+            waiting = _behind(waiting, replace(piece, sigma=piece.sigma * gain))
             if samples.size:
                 yield replace(_part_of(waiting, 0, samples.size), samples=samples)
             waiting = _part_of(waiting, samples.size, None)
