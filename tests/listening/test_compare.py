@@ -184,15 +184,23 @@ def test_masked_samples_do_not_count_and_may_be_no_numbers() -> None:
         compare(a, RATE_HZ, bad, RATE_HZ)
 
 
+def test_a_masked_bang_leaves_the_envelope_alone() -> None:
+    a = _music()
+    b, mask = a.copy(), np.zeros(COUNT, bool)
+    b[9_000:9_050] += 40.0
+    mask[8_300:9_750] = True
+    assert compare(a, RATE_HZ, b, RATE_HZ, mask=mask).envelope_r > 0.999
+    assert compare(a, RATE_HZ, b, RATE_HZ).envelope_r < 0.5
+
+
 @pytest.mark.parametrize("new_rate_hz", [30_000.0, 96_000.0])
 def test_a_mask_hides_every_new_sample_that_hears_a_hidden_one(new_rate_hz: float) -> None:
     hidden = np.zeros(1_000, bool)
     hidden[[100, 600]] = True
     mask = mask_at_rate(hidden, RATE_HZ, new_rate_hz, count=round(1_000 * new_rate_hz / RATE_HZ))
-    places = np.flatnonzero(mask) * RATE_HZ / new_rate_hz
-    reach = max(1.0, RATE_HZ / new_rate_hz) / 2
-    assert {100, 600} == {int(near) for near in np.where(places < 350, 100, 600)}
-    assert np.max(np.minimum(np.abs(places - 100), np.abs(places - 600))) <= reach + 1e-9
+    places = np.arange(len(mask)) * RATE_HZ / new_rate_hz
+    nearest = np.minimum(np.abs(places - 100), np.abs(places - 600))
+    assert mask.tolist() == (nearest <= max(1.0, RATE_HZ / new_rate_hz) / 2).tolist()
 
 
 def test_several_channels_are_averaged_or_one_is_taken() -> None:
@@ -273,6 +281,15 @@ def test_the_delay_of_the_correlation_is_the_delay() -> None:
     assert delay_samples(music[100:], music[:-100], max_lag=300) == pytest.approx(100, abs=1e-3)
     assert delay_samples(music[:-100], -music[100:], max_lag=300) == pytest.approx(-100, abs=1e-3)
     assert delay_samples(music[100:], music[:-100], max_lag=0) == 0
+    moved = band_passed(music, rate_hz=RATE_HZ, band_hz=(1.0, 22_000.0), advance_s=-0.43 / RATE_HZ)
+    assert delay_samples(music, moved, max_lag=300) == pytest.approx(0.43, abs=1e-3)
+
+
+def test_a_filter_finds_no_step_where_a_sound_begins_and_ends() -> None:
+    time_s = np.arange(4_411) / RATE_HZ  # whole periods, so that the point reflection is the tone's own continuation
+    tone = np.sin(2 * np.pi * 700 * time_s)
+    passed = band_passed(tone, rate_hz=RATE_HZ, band_hz=(150.0, 9_000.0))
+    assert passed == pytest.approx(tone, abs=2e-3)
 
 
 def test_pearson_agrees_with_numpy_and_knows_no_constant() -> None:

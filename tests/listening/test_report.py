@@ -10,6 +10,7 @@ import pytest
 
 from gramoscope.errors import OutputError
 from gramoscope.listening.report import write_json
+from gramoscope.listening.whole_file import written_whole
 
 
 def test_numpy_values_come_back_as_numbers_and_what_is_no_number_as_null(tmp_path: Path) -> None:
@@ -43,6 +44,17 @@ def test_a_value_that_json_does_not_know_leaves_the_older_report_alone(tmp_path:
         write_json(tmp_path / "report.json", {"bad": 1j})
     assert [path.name for path in tmp_path.iterdir()] == ["report.json"]
     assert "older" in (tmp_path / "report.json").read_text()
+
+
+def test_an_interrupted_file_vanishes(tmp_path: Path) -> None:
+    def interrupt() -> None:
+        with written_whole(tmp_path / "report.json") as temporary:
+            temporary.write_text("half a rep")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupt()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_missing_folder_is_an_output_error(tmp_path: Path) -> None:
