@@ -119,6 +119,13 @@ def test_sample_0_is_s_0_wherever_the_grid_begins(start_m):
     np.testing.assert_array_equal((sound.flags & Quality.INTERPOLATED) != 0, before)
 
 
+def test_before_a_grid_that_begins_late_its_first_value_is_held():
+    motion = motion_of(lambda t: tone(t, 3000.0), start_m=2.3e-3)
+    sound = joined(Resampler(SPIRAL).resample([motion]))
+    np.testing.assert_allclose(sound.samples[:90], motion.lateral_velocity_m_s[0], rtol=1e-4)
+    np.testing.assert_array_equal(sound.sigma[:90], motion.lateral_sigma_m_s[0])
+
+
 def test_edges_are_flagged_and_stay_in_the_neighbourhood_of_the_truth():
     sound = joined(Resampler(SPIRAL).resample([motion_of(lambda t: tone(t, 500.0))]))
     edge = (sound.flags & Quality.EDGE) != 0
