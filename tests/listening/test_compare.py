@@ -196,10 +196,11 @@ def test_a_masked_bang_leaves_the_envelope_alone() -> None:
 @pytest.mark.parametrize("new_rate_hz", [30_000.0, 96_000.0])
 def test_a_mask_hides_every_new_sample_that_hears_a_hidden_one(new_rate_hz: float) -> None:
     hidden = np.zeros(1_000, bool)
-    hidden[[100, 600]] = True
+    hidden_at = np.array([100, 251, 252, 404, 600, 777])
+    hidden[hidden_at] = True
     mask = mask_at_rate(hidden, RATE_HZ, new_rate_hz, count=round(1_000 * new_rate_hz / RATE_HZ))
     places = np.arange(len(mask)) * RATE_HZ / new_rate_hz
-    nearest = np.minimum(np.abs(places - 100), np.abs(places - 600))
+    nearest = np.min(np.abs(places[:, np.newaxis] - hidden_at), axis=1)
     assert mask.tolist() == (nearest <= max(1.0, RATE_HZ / new_rate_hz) / 2).tolist()
 
 
