@@ -28,6 +28,8 @@ import numpy as np
 import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+IntArray = npt.NDArray[np.int64]
 Columns = Literal["forward", "backward"]
 Rows = Literal["inward", "outward"]
 Scalar = TypeVar("Scalar", bound=np.generic)

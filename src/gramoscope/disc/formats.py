@@ -10,6 +10,12 @@ import numpy as np
 from gramoscope.errors import require
 
 Cut = Literal["lateral", "vertical", "stereo"]
+Direction = Literal["lateral", "vertical"]
+
+
+def direction_of_cut(cut: Cut) -> Direction:
+    """Return the direction of motion that is the sound; a stereo groove played as mono is its lateral motion."""
+    return "vertical" if cut == "vertical" else "lateral"
 
 
 @dataclass(frozen=True)

@@ -50,10 +50,10 @@ def centroids(
     weight : float64 array, shape (column,)
         Sum of the weights.
     """
-    weight = np.bincount(columns, weights, width)
+    weight = np.asarray(np.bincount(columns, weights, width), np.float64)
     with np.errstate(invalid="ignore", divide="ignore"):
         row = np.bincount(columns, weights * rows, width) / weight
-    return row, weight
+    return np.asarray(row, np.float64), weight
 
 
 def fill_voids(row: FloatArray, line_row: FloatArray) -> Centreline:
@@ -69,7 +69,12 @@ def fill_voids(row: FloatArray, line_row: FloatArray) -> Centreline:
 
 
 def discard_damaged_columns(
-    label: npt.NDArray[np.int64], columns: npt.NDArray[np.int64], *, width: int, most_outside: int = 12, margin_px: int = 4
+    label: npt.NDArray[np.int64],
+    columns: npt.NDArray[np.int64],
+    *,
+    width: int,
+    most_outside: int = 12,
+    margin_px: int = 4,
 ) -> npt.NDArray[np.int64]:
     """Set aside the points of columns in which damage runs across the stripes.
 

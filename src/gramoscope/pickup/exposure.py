@@ -23,7 +23,7 @@ class Exposure:
         Share of pixels at full scale above which the texture is lost.
     """
 
-    least_contrast: float = 0.004
+    least_contrast: float = 0.002
     saturated_share: float = 0.2
 
     def sort_out(self, group: FrameGroup) -> tuple[FrameGroup, Quality]:

@@ -12,10 +12,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from gramoscope.conventions import FloatArray
-
-IntArray = npt.NDArray[np.int64]
-BoolArray = npt.NDArray[np.bool_]
+from gramoscope.conventions import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from gramoscope.conventions import BoolArray
 from gramoscope.pickup.flow.derivatives import Derivatives
 from gramoscope.pickup.flow.horn_schunck import Flow
-
-BoolArray = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

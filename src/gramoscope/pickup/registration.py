@@ -15,6 +15,7 @@ carry texture.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numba
 import numpy as np
@@ -195,7 +196,9 @@ def _shift_correction(here, there, rows, shift_px):  # type: ignore[no-untyped-d
     return cross / square if square > 0 else 0.0
 
 
-def textured_rows(image: npt.NDArray[np.uint8] | npt.NDArray[np.uint16], *, share: float = 0.25) -> npt.NDArray[np.int64]:
+def textured_rows(
+    image: npt.NDArray[np.uint8] | npt.NDArray[np.uint16], *, share: float = 0.25
+) -> npt.NDArray[np.int64]:
     """Return the rows whose gradients along the groove hold at least `share` of the strongest row's power.
 
     The power that every row has (camera noise) is taken off first, as the lower quartile over the rows.
@@ -268,7 +271,7 @@ def frame_shifts(group: FrameGroup) -> tuple[FloatArray, FloatArray]:
     rows = textured_rows(group.images[index[0]])
     step_m = np.full(max(group.images.shape[0] - 1, 0), np.nan)
     shift = np.zeros(index.size)
-    for i, (a, b) in enumerate(zip(index[:-1], index[1:], strict=True)):
+    for i, (a, b) in enumerate(pairwise(index)):
         expected = max(float(nominal[b] - nominal[a]), 0.0)
         found = pair_shift_px(group.images[a], group.images[b], expected_px=expected, rows=rows)
         shift[i + 1] = shift[i] + (expected if np.isnan(found) else found)

@@ -10,12 +10,12 @@ is the paper's.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from gramoscope.apparatus.bench import Bench
-from gramoscope.conventions import INNER, OUTER, FloatArray, lateral_of_row_m, rad
+from gramoscope.conventions import FloatArray, IntArray, lateral_of_row_m, rad
 from gramoscope.errors import require
 from gramoscope.pickup.centreline import Centreline, centroids, discard_damaged_columns, fill_voids
 from gramoscope.pickup.exposure import Exposure
@@ -24,18 +24,18 @@ from gramoscope.pickup.flow.horn_schunck import Flow, FlowMethod, GrooveHornSchu
 from gramoscope.pickup.hough import Accumulator, Line, accumulate, peaks, segment
 from gramoscope.pickup.in_focus import InFocus
 from gramoscope.pickup.registration import Canvas, frame_shifts, register
-from gramoscope.pickup.stripes import Stripe, StripeModel, expected_stripes
+from gramoscope.pickup.stripes import Stripe, StripeModel, expected_stripes, kept_stripes
 from gramoscope.pickup.wall import Planes, WallOrientation
 from gramoscope.pickup.wall_samples import WallSamples, samples_of_wall
 from gramoscope.quality import Quality, no_flags
 from gramoscope.signal_path import FrameGroup, Texture, WallTrace
 
-IntArray = npt.NDArray[np.int64]
 CANDIDATE_LINES = 6
 NEARLY_WHITE = 0.97
 """Points brighter than this share of full scale are burnt out: their texture is the camera's."""
 TEXTURE_REACH_PX = 40
 """How far, beyond the nominal overlap, the strips reach that neighbouring stretches are matched by."""
+
 
 @dataclass(frozen=True)
 class HoughSearch:
@@ -71,7 +71,7 @@ class HoughSearch:
     def theta_rad(self) -> FloatArray:
         """The angles tried."""
         steps = round(self.theta_reach_deg / self.theta_step_deg)
-        return np.deg2rad(np.arange(-steps, steps + 1) * self.theta_step_deg)
+        return np.asarray(np.deg2rad(np.arange(-steps, steps + 1) * self.theta_step_deg), np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,12 +209,25 @@ class SeedPaperPickup:
             self._centreline(number, rows, columns, weights, label, segments, canvas.mean.shape[1])
             for number in range(len(stripes))
         ]
-        kept = _kept(stripes)
+        kept = kept_stripes(stripes)
         planes, samples = self._orient(stripes, lines, segments)
         head, tail = self._textures(group, canvas, derivatives)
         trace = replace(self._trace(group, samples, exposure_flags, step_m), head=head, tail=tail)
         return Reading(
-            group, canvas, derivatives, contrast, flow, rows, columns, label, segments, stripes, lines, kept, planes, trace
+            group,
+            canvas,
+            derivatives,
+            contrast,
+            flow,
+            rows,
+            columns,
+            label,
+            segments,
+            stripes,
+            lines,
+            kept,
+            planes,
+            trace,
         )
 
     def _flow(self, derivatives: Derivatives, step_m: FloatArray) -> Flow:
@@ -237,7 +250,7 @@ class SeedPaperPickup:
         borders = np.linspace(0, shape[1], self.hough.segments + 1).astype(int)
         glass = self.bench.cover_glass
         accumulators, candidates, assignments = [], [], []
-        for start, stop in zip(borders[:-1], borders[1:], strict=True):
+        for start, stop in pairwise(borders):
             inside = (columns >= start) & (columns < stop)
             votes = accumulate(
                 rows[inside],
@@ -300,8 +313,8 @@ class SeedPaperPickup:
         """Planes and samples of each wall that the kept stripes make; the planes are those of the last wall."""
         stations = self.orientation.stations(lines[0].row.size)
         samples = {}
-        for wall in sorted({stripes[i].wall for i in _kept(stripes)}):
-            mine = [i for i in _kept(stripes) if stripes[i].wall == wall]
+        for wall in sorted({stripes[i].wall for i in kept_stripes(stripes)}):
+            mine = [i for i in kept_stripes(stripes) if stripes[i].wall == wall]
             rows = np.array([lines[i].row for i in mine])
             measured = np.array([lines[i].measured for i in mine])
             planes = self.orientation.fit(rows, measured)
@@ -380,15 +393,6 @@ class SeedPaperPickup:
             flags=no_flags(2, stations) | np.uint16(flags | Quality.INTERPOLATED),
             problems=group.problems,
         )
-
-
-def _kept(stripes: tuple[Stripe, ...]) -> tuple[int, ...]:
-    """The stripes of the wall that shows two of them; all stripes when no wall does."""
-    for wall in (INNER, OUTER):
-        mine = tuple(i for i, stripe in enumerate(stripes) if stripe.wall == wall)
-        if len(mine) == 2:
-            return mine
-    return tuple(range(len(stripes)))
 
 
 def _line_slope(segments: list[SegmentReading], stripes: list[int], stations: FloatArray) -> FloatArray:

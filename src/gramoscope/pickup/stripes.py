@@ -66,6 +66,22 @@ def expected_stripes(bench: Bench) -> tuple[Stripe, ...]:
     return tuple(sorted(stripes, key=lambda stripe: stripe.row))
 
 
+def kept_stripes(stripes: Sequence[Stripe]) -> tuple[int, ...]:
+    """Return the numbers of the stripes that the paper keeps: those of the wall that shows two; all when no wall does."""
+    for wall in (INNER, OUTER):
+        mine = tuple(i for i, stripe in enumerate(stripes) if stripe.wall == wall)
+        if len(mine) == 2:
+            return mine
+    return tuple(range(len(stripes)))
+
+
+def walls_read(bench: Bench) -> tuple[str, ...]:
+    """Return the names of the walls that are read from a bench's pictures."""
+    stripes = expected_stripes(bench)
+    walls = {stripes[i].wall for i in kept_stripes(stripes)}
+    return tuple(name for wall, name in ((INNER, "inner"), (OUTER, "outer")) if wall in walls)
+
+
 @dataclass(frozen=True)
 class Assignment:
     """One way in which the lines of a segment can be the expected stripes.
@@ -174,7 +190,10 @@ class StripeModel:
         back: list[list[int]] = []
         for border, before, after in zip(borders, choices[:-1], choices[1:], strict=True):
             best = [
-                max(range(len(before)), key=lambda i: total[i] if self._runs_on(before[i], to, border, stripes) else -1.0)
+                max(
+                    range(len(before)),
+                    key=lambda i: total[i] if self._runs_on(before[i], to, border, stripes) else -1.0,
+                )
                 for to in after
             ]
             total = [total[i] + to.score for i, to in zip(best, after, strict=True)]

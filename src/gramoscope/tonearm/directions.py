@@ -12,16 +12,13 @@ With one wall only, the direction of the cut is read on the assumption that the 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from gramoscope.conventions import INNER, OUTER, FloatArray
-from gramoscope.disc.formats import Cut
+from gramoscope.disc.formats import Direction
 from gramoscope.quality import NOT_MEASURED, FlagArray
 from gramoscope.signal_path import WallTrace
-
-Direction = Literal["lateral", "vertical"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,11 +41,6 @@ class Observations:
     def thinned(self, step: int) -> Observations:
         """Return every `step`-th sample."""
         return Observations(self.arc_m[::step], self.slope[::step], self.variance[::step], self.flags[::step])
-
-
-def direction_of_cut(cut: Cut) -> Direction:
-    """Return the direction that a mono transfer of a cut listens to."""
-    return "vertical" if cut == "vertical" else "lateral"
 
 
 def observe(trace: WallTrace, direction: Direction, *, wall_angle_rad: float) -> Observations:

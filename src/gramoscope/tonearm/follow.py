@@ -16,11 +16,12 @@ from itertools import chain, islice
 
 import numpy as np
 
-from gramoscope.conventions import FloatArray
+from gramoscope.conventions import BoolArray, FloatArray, IntArray
+from gramoscope.disc.formats import Direction
 from gramoscope.errors import require
 from gramoscope.quality import NOT_MEASURED, FlagArray, Quality
 from gramoscope.signal_path import GrooveMotion, WallTrace
-from gramoscope.tonearm.directions import Direction, Observations, observe
+from gramoscope.tonearm.directions import Observations, observe
 from gramoscope.tonearm.kalman import Prior, State, learn_prior, rest, smooth
 from gramoscope.turntable.rotation import Rotation
 
@@ -73,7 +74,7 @@ class _Buffer:
 
     @staticmethod
     def empty() -> _Buffer:
-        return _Buffer(*(np.empty(0) for _ in range(4)), np.empty(0, np.uint16))
+        return _Buffer(np.empty(0), np.empty(0), np.empty(0), np.empty(0), np.empty(0, np.uint16))
 
     def with_stretch(self, seen: Observations, correlation_samples: float) -> _Buffer:
         return _Buffer(
@@ -84,7 +85,7 @@ class _Buffer:
             np.concatenate([self.flags, seen.flags]),
         )
 
-    def part(self, keep: FloatArray) -> _Buffer:
+    def part(self, keep: BoolArray | IntArray) -> _Buffer:
         return _Buffer(self.arc_m[keep], self.slope[keep], self.variance[keep], self.single[keep], self.flags[keep])
 
 
@@ -142,7 +143,11 @@ class Tonearm:
                 last = max(last, float(seen.arc_m[-1]))
                 trace, taken = next(traces, None), taken + 1
             heard = last if trace is None else trace.arc_start_m
-            end = max(last, self.passage_length_m) if trace is None else heard - self.smoother.lookahead / prior.rate_per_m
+            end = (
+                max(last, self.passage_length_m)
+                if trace is None
+                else heard - self.smoother.lookahead / prior.rate_per_m
+            )
             stop = int(np.floor(end / step_m)) + 1
             if stop > done:
                 motion, state, outlier = self._answer(buffer, prior, state, done, stop, heard, step_m)
@@ -152,9 +157,9 @@ class Tonearm:
 
     def _answer(
         self, buffer: _Buffer, prior: Prior, state: State, start: int, stop: int, heard: float, step_m: float
-    ) -> tuple[GrooveMotion, State, FloatArray]:
+    ) -> tuple[GrooveMotion, State, BoolArray]:
         """Smooth everything heard beyond the last answer, and answer grid points start … stop − 1."""
-        grid = np.arange(start, stop) * step_m
+        grid: FloatArray = np.arange(start, stop, dtype=np.float64) * step_m
         fresh = np.flatnonzero((buffer.arc_m > state.arc_m) & (buffer.arc_m <= heard))
         arc = np.concatenate([buffer.arc_m[fresh], grid])
         order = np.argsort(arc, kind="stable")
@@ -181,8 +186,9 @@ class Tonearm:
     ) -> GrooveMotion:
         speed = self.rotation.speed_at_m_s(grid)
         velocity, error, nothing = slope * speed, sigma * speed, np.full(grid.size, np.nan)
-        pair = (velocity, error, nothing, nothing) if self.direction == "lateral" else (nothing, nothing, velocity, error)
-        return GrooveMotion(float(grid[0]), step_m, *pair, flags)
+        if self.direction == "lateral":
+            return GrooveMotion(float(grid[0]), step_m, velocity, error, nothing, nothing, flags)
+        return GrooveMotion(float(grid[0]), step_m, nothing, nothing, velocity, error, flags)
 
     def _learn(self, traces: list[WallTrace]) -> Prior:
         """Learn from samples so far apart that their errors are their own."""
@@ -207,7 +213,7 @@ class Tonearm:
 OUTLIER = np.uint16(Quality.OUTLIER | Quality.INTERPOLATED)
 
 
-def _mark(buffer: _Buffer, outlier: FloatArray, heard: float) -> _Buffer:
+def _mark(buffer: _Buffer, outlier: BoolArray, heard: float) -> _Buffer:
     """Outliers stay outliers when the next block looks at them again."""
     flags = np.where(outlier & (buffer.arc_m <= heard), buffer.flags | OUTLIER, buffer.flags)
     slope = np.where(outlier, np.nan, buffer.slope)

@@ -22,7 +22,7 @@ import numba
 import numpy as np
 from scipy import optimize
 
-from gramoscope.conventions import FloatArray
+from gramoscope.conventions import BoolArray, FloatArray
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ class Smoothed:
 
     mean: FloatArray
     sigma: FloatArray
-    outlier: FloatArray
+    outlier: BoolArray
     filtered: State
     log_likelihood: float
 
@@ -214,10 +214,7 @@ def smooth(
         arc_m, value, variance, single, gate, prior.sigma**2, prior.rate_per_m, start.arc_m, m, p,
         means, covs, pred_m, pred_p, outlier,
     )  # fmt: skip
-    if n:
-        filtered = State(float(arc_m[keep]), means[keep] / scale, covs[keep] / np.outer(scale, scale))
-    else:
-        filtered = start
+    filtered = State(float(arc_m[keep]), means[keep] / scale, covs[keep] / np.outer(scale, scale)) if n else start
     _smooth(arc_m, prior.sigma**2, prior.rate_per_m, means, covs, pred_m, pred_p)
     return Smoothed(means[:, 0], np.sqrt(np.maximum(covs[:, 0, 0], 0)), outlier, filtered, float(loglik))
 

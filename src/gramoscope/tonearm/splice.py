@@ -163,5 +163,3 @@ class Splice:
             predicted, spread = error + match.error_m, variance + self.match_sigma_m**2
         gain = spread / (spread + self.encoder_sigma_m**2)
         return predicted * (1 - gain), spread * (1 - gain)
-
-

@@ -202,7 +202,7 @@ class HornSchunck:
         require(self.alpha > 0, f"alpha is {self.alpha}", "a positive weight")
         require(self.iterations >= 1, f"{self.iterations} sweeps", "at least one")
 
-    def flow(self, derivatives: Derivatives, *, shear: FloatArray | None = None) -> Flow:  # noqa: ARG002
+    def flow(self, derivatives: Derivatives, *, shear: FloatArray | None = None) -> Flow:
         """Return the flow; `shear` is of no use to the plain method."""
         return solve_horn_schunck(derivatives, alpha=self.alpha, iterations=self.iterations)
 

@@ -1,0 +1,86 @@
+"""The files of a transfer: all of them, or none."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from matplotlib.figure import Figure
+
+from gramoscope.errors import OutputError
+from gramoscope.listening.ink import save_png
+from gramoscope.listening.report import write_json
+from gramoscope.listening.wav import WavWriter
+
+FLAT, EQUALISED, REPORT, PICTURE = "flat.wav", "equalised.wav", "report.json", "groove.png"
+
+
+class Outputs:
+    """Writes the files of a transfer into a folder; use it in a `with` statement.
+
+    Sound grows in temporary files. At the end of the block everything is put under its name, the report last; a block
+    that fails, or is interrupted, leaves nothing behind, and an earlier transfer in the same folder as it was.
+
+    Parameters
+    ----------
+    folder : Path
+        Made if it does not exist.
+    rate_hz : float
+
+    Raises
+    ------
+    OutputError
+        If something cannot be written.
+    """
+
+    def __init__(self, folder: Path, *, rate_hz: float) -> None:
+        self.folder = folder
+        self._rate_hz = rate_hz
+        self._made: list[Path] = []
+
+    def __enter__(self) -> Self:
+        self._make_folder()
+        with contextlib.ExitStack() as undo:
+            undo.callback(self._remove_made)
+            self.flat = WavWriter(self.folder / FLAT, rate_hz=self._rate_hz)
+            undo.callback(self.flat.discard)
+            self.equalised = WavWriter(self.folder / EQUALISED, rate_hz=self._rate_hz)
+            undo.pop_all()
+        return self
+
+    def finish(self, report: Mapping[str, Any], picture: Figure) -> None:
+        """Put everything under its name."""
+        self.flat.finish()
+        self.equalised.finish()
+        # whoever sees a report sees a whole transfer: an old one goes first, the new one comes last
+        (self.folder / REPORT).unlink(missing_ok=True)
+        save_png(picture, self.folder / PICTURE)
+        self.flat.commit()
+        self.equalised.commit()
+        write_json(self.folder / REPORT, report)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.flat.discard()
+        self.equalised.discard()
+        if kind is not None:
+            self._remove_made()
+
+    def _make_folder(self) -> None:
+        missing = [path for path in (self.folder, *self.folder.parents) if not path.exists()]
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(
+                f"{self.folder} cannot be made: {error.strerror}", "a folder to write into", "choose another --out"
+            ) from error
+        self._made = missing
+
+    def _remove_made(self) -> None:
+        for path in self._made:
+            with contextlib.suppress(OSError):
+                path.rmdir()

@@ -1,0 +1,77 @@
+"""Provenance: from what, with what and how a transfer was made."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import sys
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from gramoscope.apparatus.capture import Capture
+from gramoscope.apparatus.fingerprint import sha256_of_file
+from gramoscope.player.recipe import Recipe
+
+_LIBRARIES = ("gramoscope", "numpy", "scipy", "numba", "soxr", "soundfile", "tifffile", "zarr", "imageio")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of everything that a result depends on."""
+    return {
+        **{name: version(name) for name in _LIBRARIES},
+        "python": platform.python_version(),
+        "system": f"{platform.system()} {platform.machine()}",
+    }
+
+
+def bench_of(capture: Capture) -> dict[str, Any]:
+    """Return the apparatus in plain numbers, SI units."""
+    bench = capture.bench
+    return {**asdict(bench), "focus_through_glass_m": bench.focus_through_glass_m, "stripe_rows": bench.stripe_rows()}
+
+
+def recipe_of(recipe: Recipe) -> dict[str, Any]:
+    """Return the recipe as written, and its hash."""
+    source = dict(recipe.source)
+    return {**source, "sha256": hashlib.sha256(repr(sorted(source.items())).encode()).hexdigest()}
+
+
+@dataclass
+class InputHashes:
+    r"""SHA-256 of everything that was read: one sum for each file common to all groups, one over the files of the groups.
+
+    The sum over the groups is that of the lines ``<sum>  <path>\n`` in order of the groups, as `sha256sum` prints them, so
+    that a transfer of a million files needs no list of a million lines.
+    """
+
+    files: int = 0
+    _lines: Any = field(default_factory=hashlib.sha256)
+
+    def add(self, sums: dict[str, str]) -> None:
+        """Take in the sums of one group's files."""
+        for path, digest in sums.items():
+            self._lines.update(f"{digest}  {path}\n".encode())
+            self.files += 1
+
+    def as_dict(self, capture: Capture) -> dict[str, Any]:
+        """Return all sums, for the report."""
+        return {
+            "common_files": {_inside(capture, path): sha256_of_file(path) for path in capture.common_files()},
+            "group_files": {"count": self.files, "sha256_of_sha256sum_lines": self._lines.hexdigest()},
+        }
+
+
+def hash_group(capture: Capture, number: int) -> dict[str, str]:
+    """Return path → SHA-256 of the files that hold one group; an unreadable file has an empty sum."""
+    return {_inside(capture, path): sha256_of_file(path) for path in capture.files_of_group(number)}
+
+
+def _inside(capture: Capture, path: Path) -> str:
+    return path.relative_to(capture.folder).as_posix()
+
+
+def command_line() -> str:
+    """Return the command as it was typed."""
+    return " ".join(["gramoscope", *sys.argv[1:]])

@@ -1,0 +1,200 @@
+"""Recipes: what we choose to do with a capture, as opposed to what the apparatus is (`apparatus.bench`).
+
+A recipe is a TOML file. Each of its tables is one part of the player, each key a parameter of that part; names are
+resolved to parts here and nowhere else.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, field, fields
+from difflib import get_close_matches
+from importlib import resources
+from pathlib import Path
+from typing import Any, TypeVar, get_type_hints
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+from gramoscope.apparatus.bench import Bench
+from gramoscope.errors import ArgumentError
+from gramoscope.pickup.exposure import Exposure
+from gramoscope.pickup.flow.horn_schunck import FlowMethod, GrooveHornSchunck, HornSchunck
+from gramoscope.pickup.in_focus import InFocus
+from gramoscope.pickup.seed_paper import HoughSearch, SeedPaperPickup
+from gramoscope.pickup.stripes import StripeModel
+from gramoscope.pickup.wall import WallOrientation
+from gramoscope.preamp.resample import DEFAULT_PASSBAND
+from gramoscope.tonearm.follow import KalmanSmoother
+from gramoscope.tonearm.splice import Splice
+
+DEFAULT_RECIPE = "seed-paper"
+_FLOWS: dict[str, type[FlowMethod]] = {"horn-schunck": HornSchunck, "groove-horn-schunck": GrooveHornSchunck}
+_PICKUP_PARTS = {
+    "exposure": Exposure,
+    "in_focus": InFocus,
+    "hough": HoughSearch,
+    "stripe_model": StripeModel,
+    "orientation": WallOrientation,
+}
+Part = TypeVar("Part")
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Everything that was chosen for a transfer.
+
+    Attributes
+    ----------
+    name, about : str
+    pickup : dict
+        Parameters of `SeedPaperPickup`, all but the bench.
+    splice : Splice
+    smoother : KalmanSmoother
+    passband : float
+        Of the resampler.
+    source : dict
+        The recipe as it was written, for the report.
+    """
+
+    name: str
+    about: str = ""
+    pickup: Mapping[str, Any] = field(default_factory=dict)
+    splice: Splice = field(default_factory=Splice)
+    smoother: KalmanSmoother = field(default_factory=KalmanSmoother)
+    passband: float = DEFAULT_PASSBAND
+    source: Mapping[str, Any] = field(default_factory=dict)
+
+    def pickup_for(self, bench: Bench) -> SeedPaperPickup:
+        """Return the cartridge, fitted to an apparatus."""
+        return SeedPaperPickup(bench, **self.pickup)
+
+
+def shipped_recipes() -> tuple[str, ...]:
+    """Return the names of the recipes that ship with us."""
+    folder = resources.files("gramoscope.player").joinpath("recipes")
+    return tuple(sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")))
+
+
+def load_recipe(name_or_file: str) -> Recipe:
+    """Return a recipe by its name or from a file.
+
+    Parameters
+    ----------
+    name_or_file : str
+        A name from `shipped_recipes`, or the path of a TOML file.
+
+    Raises
+    ------
+    ArgumentError
+        If there is no such recipe, or a key is unknown or impossible.
+    """
+    if name_or_file in shipped_recipes():
+        text = resources.files("gramoscope.player").joinpath("recipes", f"{name_or_file}.toml").read_text("utf-8")
+    else:
+        text = _read_file(name_or_file)
+    try:
+        return recipe_of_table(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise ArgumentError(f"recipe {name_or_file} is not valid TOML: {error}", "a TOML file") from error
+
+
+def _read_file(name: str) -> str:
+    path = Path(name)
+    if not path.is_file():
+        raise ArgumentError(
+            f"there is no recipe {name!r}",
+            f"one of {', '.join(shipped_recipes())}, or the path of a TOML file",
+            "copy a shipped recipe with: gramoscope recipe seed-paper > my-recipe.toml",
+        )
+    try:
+        return path.read_text("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ArgumentError(f"recipe {name} cannot be read: {error}", "a TOML file in UTF-8") from error
+
+
+def recipe_of_table(table: Mapping[str, Any]) -> Recipe:
+    """Return the recipe that a parsed TOML file describes; ArgumentError if a key is unknown or impossible."""
+    _only(table, ("name", "about", "pickup", "tonearm", "preamp"), "the recipe")
+    pickup, tonearm, preamp = (_table(table, key) for key in ("pickup", "tonearm", "preamp"))
+    _only(tonearm, ("splice", "smoother"), "[tonearm]")
+    _only(preamp, ("passband",), "[preamp]")
+    return Recipe(
+        name=str(table.get("name", "unnamed")),
+        about=str(table.get("about", "")),
+        pickup=_pickup_of_table(pickup),
+        splice=build(Splice, _table(tonearm, "splice"), "[tonearm.splice]"),
+        smoother=build(KalmanSmoother, _table(tonearm, "smoother"), "[tonearm.smoother]"),
+        passband=_checked(float, preamp.get("passband", DEFAULT_PASSBAND), "[preamp] passband"),
+        source=dict(table),
+    )
+
+
+def _pickup_of_table(table: Mapping[str, Any]) -> dict[str, Any]:
+    _only(table, ("cartridge", "smoothing_px", "flow", *_PICKUP_PARTS), "[pickup]")
+    cartridge = table.get("cartridge", "seed-paper")
+    if cartridge != "seed-paper":
+        raise ArgumentError(f"[pickup] cartridge = {cartridge!r}", '"seed-paper"')
+    parts: dict[str, Any] = {
+        name: build(kind, _table(table, name), f"[pickup.{name}]") for name, kind in _PICKUP_PARTS.items()
+    }
+    flow = dict(_table(table, "flow"))
+    method = flow.pop("method", "groove-horn-schunck")
+    if method not in _FLOWS:
+        raise ArgumentError(f"[pickup.flow] method = {method!r}", f"one of {', '.join(_FLOWS)}")
+    parts["flow"] = build(_FLOWS[method], flow, "[pickup.flow]")
+    if "smoothing_px" in table:
+        parts["smoothing_px"] = _checked(float, table["smoothing_px"], "[pickup] smoothing_px")
+    return parts
+
+
+def build(kind: type[Part], table: Mapping[str, Any], where: str) -> Part:
+    """Make a part from a table of its parameters.
+
+    Parameters
+    ----------
+    kind : type
+        A dataclass.
+    table : mapping
+        Parameter → value; those left out keep their defaults.
+    where : str
+        How to call the table in messages.
+
+    Raises
+    ------
+    ArgumentError
+        If a key is unknown, a value of the wrong type or impossible, or one without default is missing.
+    """
+    known = {f.name: f for f in fields(kind)}  # type: ignore[arg-type]
+    _only(table, tuple(known), where)
+    missing = [n for n, f in known.items() if n not in table and f.default is MISSING and f.default_factory is MISSING]
+    if missing:
+        raise ArgumentError(f"{where} lacks {', '.join(missing)}", "a value for each")
+    hints = get_type_hints(kind)
+    return kind(**{name: _checked(hints[name], value, f"{where} {name}") for name, value in table.items()})
+
+
+def _checked(hint: Any, value: Any, where: str) -> Any:
+    try:
+        return TypeAdapter(hint, config=ConfigDict(allow_inf_nan=False)).validate_python(value)
+    except ValidationError as error:
+        problem = error.errors()[0]
+        raise ArgumentError(f"{where} = {value!r}", problem["msg"].lower()) from error
+
+
+def _only(table: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
+    for key in table:
+        if key not in known:
+            near = get_close_matches(key, known, 1)
+            raise ArgumentError(
+                f"{where} has an unknown key {key!r}",
+                f"one of {', '.join(known)}",
+                f"write {near[0]!r}" if near else "",
+            )
+
+
+def _table(table: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+    value = table.get(key, {})
+    if not isinstance(value, Mapping):
+        raise ArgumentError(f"{key} = {value!r}", f"a table [{key}]")
+    return value

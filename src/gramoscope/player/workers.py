@@ -1,0 +1,47 @@
+"""Work on many stretches at once, answers in order, a bounded number in memory."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TypeVar
+
+from gramoscope.errors import require
+
+Task = TypeVar("Task")
+Answer = TypeVar("Answer")
+
+
+def in_order(work: Callable[[Task], Answer], tasks: Iterable[Task], *, workers: int) -> Iterator[Answer]:
+    """Yield the answers to tasks in the order of the tasks.
+
+    Parameters
+    ----------
+    work : callable
+        Called from several threads at once; must not depend on the order of calls.
+    tasks : iterable
+    workers : int
+        Threads; at most one task more than this is begun or waiting at a time.
+
+    Yields
+    ------
+    Answer
+
+    Raises
+    ------
+    Exception
+        The first that `work` raises; what has not begun by then never begins.
+    """
+    require(workers >= 1, f"{workers} workers", "at least one")
+    pool = ThreadPoolExecutor(workers, thread_name_prefix="pickup")
+    pending: deque[Future[Answer]] = deque()
+    try:
+        for task in tasks:
+            pending.append(pool.submit(work, task))
+            if len(pending) > workers:
+                yield pending.popleft().result()
+        while pending:
+            yield pending.popleft().result()
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
