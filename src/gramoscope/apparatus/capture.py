@@ -259,7 +259,7 @@ def _require_inside(folder: Path, manifest: Manifest) -> None:
 def _source(folder: Path, manifest: Manifest) -> FrameSource:
     pattern, sensor, sequence = FramePattern(manifest.frames), manifest.bench.sensor, manifest.bench.sequence
     if pattern.layout == "tiff":
-        return TiffFrames(folder, pattern, sequence.groups, sensor)
+        return TiffFrames(folder, pattern, sequence.groups, sequence.frames_per_group, sensor)
     if pattern.layout == "images":
         return ImageFrames(folder, pattern, sequence.groups, sequence.frames_per_group, sensor)
     path = pattern.path(folder)

@@ -40,7 +40,9 @@ class ImageFrames:
         if not is_inside(path, self.folder):
             return Lost(f"{path.name} lies outside the folder of the capture and was not opened")
         if path.suffix.lower() in TIFF_SUFFIXES:
-            page = next(read_pages(path, folder=self.folder, sensor=self.sensor), Lost(f"{path.name} has no page"))
+            page = next(
+                read_pages(path, folder=self.folder, frames=1, sensor=self.sensor), Lost(f"{path.name} has no page")
+            )
             return Lost(page.why) if isinstance(page, Lost) else page
         return read_picture(path)
 

@@ -28,13 +28,14 @@ class TiffFrames:
     folder: Path
     pattern: FramePattern
     groups: int
+    frames_per_group: int
     sensor: Sensor
     layout: Layout = "tiff"
 
     def read_group(self, number: int) -> Iterator[Frame | Lost]:
         """Yield the pages of one group's file."""
         path = self.pattern.path(self.folder, group=number)
-        return read_pages(path, folder=self.folder, sensor=self.sensor)
+        return read_pages(path, folder=self.folder, frames=self.frames_per_group, sensor=self.sensor)
 
     def files_of_group(self, number: int) -> tuple[Path, ...]:
         """Return the one file of the group."""
@@ -49,13 +50,15 @@ class TiffFrames:
         return any(self.files_of_group(number)[0].is_file() for number in range(self.groups))
 
 
-def read_pages(path: Path, *, folder: Path, sensor: Sensor) -> Iterator[Frame | Lost]:
+def read_pages(path: Path, *, folder: Path, frames: int, sensor: Sensor) -> Iterator[Frame | Lost]:
     """Yield the pages of a TIFF in order.
 
     Parameters
     ----------
     path, folder : Path
         The file, and the folder that it must not leave.
+    frames : int
+        How many are expected.
     sensor : Sensor
         Whose size the pages need to have: others are not even decoded.
 
@@ -69,7 +72,7 @@ def read_pages(path: Path, *, folder: Path, sensor: Sensor) -> Iterator[Frame | 
     try:
         with quiet_log():
             tiff = tifffile.TiffFile(path)
-            channels = _channel_pages(tiff)
+            channels = _channel_pages(tiff, frames=frames)
     except FileNotFoundError:
         yield Lost(f"{path.name} is missing", rest=True)
         return
@@ -122,14 +125,16 @@ def _page_by_pillow(path: Path, index: int) -> Frame:
         return np.array(picture)
 
 
-def _channel_pages(tiff: tifffile.TiffFile) -> int:
-    """Return how many pages make one frame: three where an OME-TIFF or ImageJ file keeps colours on pages of their own."""
+def _channel_pages(tiff: tifffile.TiffFile, *, frames: int) -> int:
+    """Return how many pages make one frame: three where an OME-TIFF or ImageJ file keeps colours on pages of their own.
+
+    Some writers call any three pages colours: they are when there are three times as many as there should be frames.
+    """
     if not (tiff.is_ome or tiff.is_imagej):
         return 1
     series = tiff.series[0]
-    axes = series.axes
-    apart = axes.endswith("CYX") and series.shape[-3] == 3
-    return 3 if apart else 1
+    apart = series.axes.endswith("CYX") and series.shape[-3] == 3
+    return 3 if apart and len(series.pages) == 3 * frames else 1
 
 
 def write_tiff(path: Path, frames: Frame, *, compress: bool = False) -> None:
@@ -143,10 +148,13 @@ def write_tiff(path: Path, frames: Frame, *, compress: bool = False) -> None:
     compress : bool
         With deflate; otherwise plain, which reads ten times faster.
     """
-    tifffile.imwrite(
-        path,
-        frames,
-        photometric="rgb" if frames.ndim == 4 else "minisblack",
-        compression="zlib" if compress else None,
-        metadata=None,
-    )
+    with tifffile.TiffWriter(path) as tiff:
+        for frame in frames:
+            # page by page, so that the directory of each stands before its pixels and a truncated file loses its end only
+            tiff.write(
+                frame,
+                photometric="rgb" if frame.ndim == 3 else "minisblack",
+                compression="zlib" if compress else None,
+                contiguous=False,
+                metadata=None,
+            )
