@@ -39,10 +39,9 @@ BINS_PER_PX = 64
 LARGEST_PX = 144
 """Discs are not made larger than this; a multiple of `COARSE`. The light of a surface so far off has no detail at all."""
 
-# variance along one axis, in pixels², of a 4-pixel block, of the coarse pixel's box and of linear interpolation, less
-# the one pixel that the fine grid has as well
-_BLOCK_VARIANCE = (COARSE**2 - 1) / 12
-_GRID_VARIANCE = _BLOCK_VARIANCE + (COARSE**2 - 1) / 12 + (COARSE**2 - 1) / 6
+# variance along one axis, in pixels², that the coarse grid adds: points gathered into a block, the coarse pixel's box, and
+# linear interpolation between coarse pixels
+_GRID_VARIANCE = (COARSE**2 - 1) / 12 + COARSE**2 / 12 + COARSE**2 / 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +164,7 @@ def split(light: Picture, radius_px: Picture, slope_tan: Picture, floor_px: np.f
 
 
 def _coarse_sources(large: Picture) -> Sources:
-    """Turn the sums over blocks of light, share, share × q² and share × slope into the blocks' own discs."""
+    """Turn the sums over blocks of light, share, share × R² and share × slope into the blocks' own discs."""
     share = 1 / np.maximum(large[1], np.float32(1e-6))
     square = np.maximum(large[2] * share - np.float32(4 * _GRID_VARIANCE), np.float32(1))
     radius = np.minimum(np.sqrt(square), np.float32(LARGEST_PX)) / np.float32(COARSE)
@@ -187,7 +186,7 @@ def _split(
     for row in range(light.shape[0]):
         lit, even = energy[0, row], energy[1, row]
         _split_row(light[row], radius_px[row], slope_tan[row], floor_px, lit, even, bins[row], ramp[row])
-        _gather_row(light[row], even, radius_px[row], slope_tan[row], large[:, row // COARSE])
+        _gather_row(light[row], even, radius_px[row], slope_tan[row], floor_px, large[:, row // COARSE])
 
 
 @numba.njit(cache=True, nogil=True)
@@ -214,7 +213,9 @@ def _split_row(
 
 
 @numba.njit(cache=True, nogil=True)
-def _gather_row(light: Picture, even: Picture, radius_px: Picture, slope_tan: Picture, large: Picture) -> None:
+def _gather_row(
+    light: Picture, even: Picture, radius_px: Picture, slope_tan: Picture, floor_px: np.float32, large: Picture
+) -> None:
     one = np.float32(1)
     for column in range(len(light)):
         rest = one - even[column]
@@ -223,7 +224,7 @@ def _gather_row(light: Picture, even: Picture, radius_px: Picture, slope_tan: Pi
         block = column // COARSE
         large[0, block] += rest * light[column]
         large[1, block] += rest
-        large[2, block] += rest * signed * signed
+        large[2, block] += rest * (signed * signed + floor_px * floor_px)
         large[3, block] += rest * (tilt if signed > 0 else -tilt)
 
 
