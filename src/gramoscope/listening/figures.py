@@ -29,6 +29,8 @@ BoolArray = npt.NDArray[np.bool_]
 
 STRIPE_COLOURS = (ink.ORANGE, ink.SKY, ink.YELLOW, ink.PURPLE)
 FILLED_IN = (0, (4, 3))
+LONGEST_LINE = 135
+"""Letters of stripes' names that fit side by side."""
 
 _CM = 100.0
 
@@ -111,7 +113,7 @@ def groove_figure(
     sound = Waveform(*waveform)
     require(len({len(part) for part in sound}) == 1, "a waveform whose parts differ in length", "equal lengths")
     height_in = 10.5 * image.shape[0] / image.shape[1]
-    figure = ink.blank_figure(11.0, height_in + 4.6)
+    figure = ink.blank_figure(11.0, height_in + 5.2)
     figure.suptitle(title, x=0.012, ha="left", fontsize=ink.LARGE, color=ink.BLACK)
     above, below = figure.subplots(2, 1, height_ratios=[height_in, 3.0])
     _draw_frame(above, image, white_level=white_level, pixel_pitch_m=pixel_pitch_m)
@@ -119,10 +121,7 @@ def groove_figure(
         _draw_stripe(above, StripeLine(*line), colour=colour, height_px=image.shape[0], pixel_pitch_m=pixel_pitch_m)
     if glass_edge_row is not None:
         _draw_glass_edge(above, float(_lateral_um(glass_edge_row, image.shape[0], pixel_pitch_m)))
-    ink.heading(above, "One frame, and the stripes found in it")
-    if stripes:
-        _explain_dashes(above)
-        ink.legend_above(above, columns=len(stripes) + 1)
+    _name_stripes(above, [line[0] for line in stripes])
     draw_waveform(below, sound)
     return figure
 
@@ -167,8 +166,17 @@ def _draw_stripe(axes: Axes, line: StripeLine, *, colour: str, height_px: int, p
     axes.plot(arc_um, filled, color=colour, linewidth=1.4, linestyle=FILLED_IN)
 
 
-def _explain_dashes(axes: Axes) -> None:
+def _name_stripes(axes: Axes, names: Sequence[str]) -> None:
+    """Write the heading, and below it which line is which; long names stand in two columns."""
+    heading = "One frame, and the stripes found in it"
+    if not names:
+        ink.heading(axes, heading)
+        return
     axes.plot([], [], color=ink.GREY, linewidth=1.4, linestyle=FILLED_IN, label="filled in")
+    entries = len(names) + 1
+    columns = entries if sum(map(len, names)) <= LONGEST_LINE else 2
+    ink.heading(axes, heading, lines_below=-(-entries // columns))
+    ink.legend_above(axes, columns=columns, side="left")
 
 
 def _widened(marked: BoolArray) -> BoolArray:

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Literal
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from gramoscope.conventions import FloatArray
 from gramoscope.listening.whole_file import written_whole
@@ -31,11 +33,13 @@ DOTS_ACROSS = 1400
 SMALL = 8.5
 MEDIUM = 10.0
 LARGE = 13.0
+LEGEND_LINE = 1.55 * SMALL
 
 
 def blank_figure(width_in: float, height_in: float) -> Figure:
     """Return an empty white figure that arranges its axes by itself."""
-    return Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, layout="constrained", facecolor="white")
+    layout = ConstrainedLayoutEngine(h_pad=0.09, w_pad=0.05)
+    return Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, layout=layout, facecolor="white")
 
 
 def dress(axes: Axes, *, x: str, y: str, grid: bool = True) -> None:
@@ -61,21 +65,23 @@ def dress(axes: Axes, *, x: str, y: str, grid: bool = True) -> None:
         axes.set_axisbelow(True)
 
 
-def heading(axes: Axes, text: str) -> None:
-    """Write a heading above axes, at their left edge."""
-    axes.set_title(text, loc="left", fontsize=MEDIUM, color=BLACK, fontweight="bold", pad=7)
+def heading(axes: Axes, text: str, *, lines_below: int = 0) -> None:
+    """Write a heading above axes, at their left edge, with room for lines of a legend below it."""
+    pad = 7 + lines_below * LEGEND_LINE
+    axes.set_title(text, loc="left", fontsize=MEDIUM, color=BLACK, fontweight="bold", pad=pad)
 
 
-def legend_above(axes: Axes, *, columns: int) -> None:
-    """List what is drawn in one line above axes, at their right edge."""
+def legend_above(axes: Axes, *, columns: int, side: Literal["left", "right"] = "right") -> None:
+    """List what is drawn just above axes, at one of their edges."""
     axes.legend(
-        loc="lower right",
-        bbox_to_anchor=(1.0, 1.0),
+        loc="lower left" if side == "left" else "lower right",
+        bbox_to_anchor=(0.0 if side == "left" else 1.0, 1.0),
         ncols=columns,
         fontsize=SMALL,
         frameon=False,
         labelcolor=BLACK,
-        borderaxespad=0.1,
+        borderpad=0.1,
+        borderaxespad=0.3,
         columnspacing=1.4,
         handlelength=1.8,
     )
