@@ -158,11 +158,24 @@ class _Tape:
         self.position = 0
 
     def _play(self, pictures: Iterator[Any]) -> Iterator[Frame | Lost]:
+        lost = Lost(f"{self.path.name}: a frame is damaged")
+        damaged, before = 0, None
         for picture in pictures:
             if isinstance(picture, Lost) or picture.is_corrupt:
-                yield Lost(f"{self.path.name}: a frame is damaged")
-            else:
-                yield pixels_of(picture)
+                damaged += 1
+                continue
+            if damaged:
+                yield from itertools.repeat(lost, max(damaged, self._between(before, picture.pts)))
+            damaged, before = 0, picture.pts
+            yield pixels_of(picture)
+        yield from itertools.repeat(lost, damaged)
+
+    def _between(self, before: int | None, after: int | None) -> int:
+        """Return how many frames lie between two time stamps; damage can swallow more of them than it reports."""
+        stream = self._container.streams.video[0]
+        if before is None or after is None or not stream.average_rate:
+            return 0
+        return int(round((after - before) * stream.time_base * stream.average_rate)) - 1
 
     def _pictures(self) -> Iterator[Any]:
         packets = self._container.demux(self._container.streams.video[0])
