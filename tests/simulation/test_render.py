@@ -117,7 +117,7 @@ def test_a_fraction_of_a_pixel_is_a_fraction_of_a_pixel(quiet: Scene, sound: np.
     window = 0.5 - 0.5 * np.cos(2 * np.pi * (columns + start_px) / (length - 1))
     error = frame - moved[:, columns + int(start_px)] / window
     staying = frame - strip[:, columns + int(start_px)]
-    assert error.std() < 0.02 * staying.std()
+    assert error.std() < 0.05 * staying.std()
 
 
 def test_a_group_is_the_same_in_whatever_order_it_is_rendered(small: Scene, sound: np.ndarray) -> None:
