@@ -1,0 +1,103 @@
+import numpy as np
+import pytest
+
+from gramoscope.apparatus.bench import Sequence
+from gramoscope.apparatus.capture import open_capture
+from gramoscope.apparatus.capture_writer import CaptureWriter
+from gramoscope.apparatus.frame_log import nominal_arc_m, read_log
+
+SEQUENCE = Sequence(groups=3, frames_per_group=2, frame_step_m=0.8e-6, group_step_m=469e-6)
+HEADER = "group,frame,arc_um,time_s"
+
+
+@pytest.fixture
+def log(tmp_path):
+    def log(text):
+        (tmp_path / "frames.csv").write_text(text, encoding="utf-8")
+        return read_log(tmp_path / "frames.csv", sequence=SEQUENCE)
+
+    return log
+
+
+def test_the_log_says_where_each_frame_was(log):
+    read = log(f"{HEADER},stage_um\n1,0,470.25,0.1,12.5\n1,1,471.0,0.2,-3\n")
+    np.testing.assert_allclose(read.arc_m[1], [470.25e-6, 471e-6], rtol=1e-14)
+    np.testing.assert_allclose(read.stage_m[1], [12.5e-6, -3e-6], rtol=1e-14)
+    assert np.isnan(read.arc_m[[0, 2]]).all()
+    assert read.has_stage
+    assert read.problems == ()
+
+
+@pytest.mark.parametrize(
+    ("row", "word"),
+    [
+        ("1,0,abc,0", "not a row of numbers"),
+        ("1,0", "not a row of numbers"),
+        ("1.5,0,3,0", "not a row of numbers"),
+        ("1,0,nan,0", "not a finite number"),
+        ("1,0,inf,0", "not a finite number"),
+        ("3,0,5,0", "no frame 0 in a group 3"),
+        ("-1,0,5,0", "no frame 0 in a group -1"),
+        ("0,2,5,0", "no frame 2 in a group 0"),
+    ],
+)
+def test_a_bad_row_is_told_with_its_line_and_left_out(log, row, word):
+    read = log(f"{HEADER}\n0,0,1.5,0\n{row}\n0,1,2.5,0\n")
+    assert len(read.problems) == 1
+    assert "line 3" in read.problems[0]
+    assert word in read.problems[0]
+    np.testing.assert_allclose(read.arc_m[0], [1.5e-6, 2.5e-6], rtol=1e-14)
+    assert np.isnan(read.arc_m[1:]).all()
+
+
+def test_the_last_of_two_entries_counts(log):
+    read = log(f"{HEADER}\n0,0,1.5,0\n0,0,2.5,0\n")
+    assert read.arc_m[0, 0] == pytest.approx(2.5e-6)
+    assert "once more" in read.problems[0]
+
+
+@pytest.mark.parametrize("text", ["", "frame,group,arc_um,time_s\n0,0,1,2\n", "group;frame;arc_um;time_s\n0;0;1;2\n"])
+def test_a_log_with_another_header_is_not_guessed_at(log, text):
+    read = log(text)
+    assert np.isnan(read.arc_m).all()
+    assert HEADER in read.problems[0]
+
+
+def test_thousands_of_bad_rows_make_a_short_story(log):
+    assert len(log(HEADER + "\n" + "x\n" * 5000).problems) == 21
+
+
+def test_a_missing_log_is_told(tmp_path):
+    assert "missing" in read_log(tmp_path / "frames.csv", sequence=SEQUENCE).problems[0]
+
+
+def test_a_byte_order_mark_and_blank_lines_do_no_harm(log):
+    read = log(f"\ufeff{HEADER}\n\n0,0,1.5,\n")
+    assert read.problems == ()
+    assert read.arc_m[0, 0] == pytest.approx(1.5e-6)
+
+
+def test_the_log_wins_and_gaps_in_it_are_filled_with_nominal_places(tmp_path, bench, film):
+    truth_m = nominal_arc_m(3, sequence=bench.sequence) + np.array([5e-6, -2e-6, 7e-6])
+    stage_m = np.array([1e-6, 2e-6, -4e-6])
+    with CaptureWriter(tmp_path / "c", bench) as writer:
+        for number, images in enumerate(film(bench)):
+            places = {"arc_start_m": truth_m, "stage_m": stage_m} if number == 3 else {}
+            writer.write_group(number, images, **places)
+    path = tmp_path / "c" / "frames.csv"
+    path.write_text("\n".join(line for line in path.read_text().splitlines() if not line.startswith("2,1,")))
+    capture = open_capture(tmp_path / "c")
+    np.testing.assert_allclose(capture.group(3).arc_start_m, truth_m, atol=1e-12)
+    np.testing.assert_allclose(capture.group(3).stage_m, stage_m, atol=1e-12)
+    group = capture.group(2)
+    np.testing.assert_allclose(group.arc_start_m, 2 * 310e-6 + np.arange(3) * 0.7e-6, atol=1e-12)
+    assert group.problems == ("frame 1: no place in the log: the nominal one is used",)
+    assert group.valid.all()
+
+
+def test_a_capture_whose_log_is_gone_plays_at_nominal_places(tmp_path, bench, film, write):
+    folder = write(tmp_path / "c", bench, film(bench))
+    (folder / "frames.csv").unlink()
+    capture = open_capture(folder)
+    assert capture.problems == ("frames.csv is missing; nominal places are used",)
+    np.testing.assert_allclose(capture.group(4).arc_start_m, nominal_arc_m(4, sequence=bench.sequence))
