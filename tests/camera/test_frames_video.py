@@ -98,6 +98,15 @@ def test_after_the_end_there_is_nothing(lossless):
     assert numbers_of_group(source, 4) == expected(4)
 
 
+def test_the_end_is_looked_for_once(lossless, monkeypatch):
+    source = VideoFrames(lossless, frames_per_group=FRAMES)
+    wound = []
+    wind_to = source._tape.wind_to
+    monkeypatch.setattr(source._tape, "wind_to", lambda index: wound.append(index) or wind_to(index))
+    assert [numbers_of_group(source, group) for group in range(GROUPS, GROUPS + 50)] == [[]] * 50
+    assert len(wound) <= 1
+
+
 @pytest.mark.parametrize("bits", [10, 12, 16])
 def test_ffv1_loses_nothing(tmp_path, bits):
     sensor = Sensor(width_px=51, height_px=34, bits=bits, colour="rgb")

@@ -14,6 +14,7 @@ import itertools
 import threading
 from collections import OrderedDict
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -26,6 +27,7 @@ from gramoscope.errors import CaptureError, NoFramesError
 
 _KEPT_GROUPS = 4
 _FRAMES_A_SECOND = 25
+_KEYS_TRIED = 3
 
 
 def load_av(path: Path) -> ModuleType:
@@ -75,6 +77,8 @@ class VideoFrames:
     def _read(self, index: int) -> Frame | Lost | None:
         if index in self._kept:
             return self._kept.pop(index)
+        if self._tape.end is not None and index >= self._tape.end:
+            return None
         reach = _KEPT_GROUPS * self.frames_per_group
         if not self._tape.position <= index <= self._tape.position + reach:
             self._tape.wind_to(index)
@@ -102,13 +106,16 @@ class VideoFrames:
 
 
 class _Tape:
-    """A video with a reading head: `position` is the number of the frame that comes next."""
+    """A video with a reading head: `position` is the number of the frame that comes next, `end` of the first that does not
+    exist, once that is known.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.position = 0
+        self.end: int | None = None
         self._av = load_av(path)
-        self._stamps: list[int] | None = None
+        self._stamps: _Stamps | None = None
         self._container = self._open()
         self._frames = self._play(self._pictures())
 
@@ -128,28 +135,34 @@ class _Tape:
     def next_frame(self) -> Frame | Lost | None:
         """Return the next frame, or None at the end."""
         frame = next(self._frames, None)
-        if frame is not None:
+        if frame is None:
+            self.end = self.position
+        else:
             self.position += 1
         return frame
 
     def wind_to(self, index: int) -> None:
-        """Move the head to a frame; to the very start where the time stamps are of no use."""
+        """Move the head to a frame or some way before it; to the very start where the time stamps are of no use."""
         if self._stamps is None:
             self._rewind()
-            self._stamps = _stamps_of(self._container)
-        self._rewind()
-        if index >= len(self._stamps):
-            return
-        self._container.seek(self._stamps[index], stream=self._container.streams.video[0], backward=True)
-        pictures = self._pictures()
-        first = next(pictures, None)
-        stamp = getattr(first, "pts", None)
-        if stamp is None:
+            self._stamps = _Stamps.of(self._container)
+        keys = self._stamps.keys_before(index)
+        if not any(self._start_at_key(key, index) for key in keys):
             self._rewind()
-            return
-        # a decoder says where it landed by the stamp of its first picture
-        self.position = bisect.bisect_left(self._stamps, stamp)
+
+    def _start_at_key(self, key: int, index: int) -> bool:
+        """Seek to a key frame; tell whether the first key frame that comes is one at or before `index`."""
+        self._rewind()
+        self._container.seek(key, stream=self._container.streams.video[0], backward=True)
+        pictures = self._pictures()
+        # pictures that come before their key frame lean on others that were never read
+        first = next((picture for picture in pictures if getattr(picture, "key_frame", False)), None)
+        position = None if first is None or self._stamps is None else self._stamps.index_of(first.pts)
+        if position is None or position > index:
+            return False
+        self.position = position
         self._frames = self._play(itertools.chain([first], pictures))
+        return True
 
     def _rewind(self) -> None:
         self._container.close()
@@ -175,7 +188,8 @@ class _Tape:
         stream = self._container.streams.video[0]
         if before is None or after is None or not stream.average_rate:
             return 0
-        return int(round((after - before) * stream.time_base * stream.average_rate)) - 1
+        steps: int = round((after - before) * stream.time_base * stream.average_rate)
+        return steps - 1
 
     def _pictures(self) -> Iterator[Any]:
         packets = self._container.demux(self._container.streams.video[0])
@@ -191,11 +205,32 @@ class _Tape:
                 yield Lost(words_of(error))
 
 
-def _stamps_of(container: Any) -> list[int]:
-    """Return the time stamps of all pictures in running order, without decoding; none if they are of no use."""
-    stamps = [packet.pts for packet in container.demux(container.streams.video[0]) if packet.size]
-    usable = None not in stamps and len(set(stamps)) == len(stamps)
-    return sorted(stamps) if usable else []
+@dataclass(frozen=True)
+class _Stamps:
+    """The time stamps of all pictures in running order, and of the key frames; none where they are of no use."""
+
+    all: list[int]
+    keys: list[int]
+
+    @classmethod
+    def of(cls, container: Any) -> _Stamps:
+        """List the stamps, without decoding."""
+        packets = [packet for packet in container.demux(container.streams.video[0]) if packet.size]
+        stamps = [packet.pts for packet in packets]
+        if None in stamps or len(set(stamps)) < len(stamps):
+            return cls([], [])
+        return cls(sorted(stamps), sorted(packet.pts for packet in packets if packet.is_keyframe))
+
+    def keys_before(self, index: int) -> list[int]:
+        """Return a few key frames at or before a frame, the nearest first."""
+        if index >= len(self.all):
+            return []
+        return self.keys[: bisect.bisect_right(self.keys, self.all[index])][: -_KEYS_TRIED - 1 : -1]
+
+    def index_of(self, stamp: int | None) -> int | None:
+        """Return which frame carries a stamp."""
+        place = len(self.all) if stamp is None else bisect.bisect_left(self.all, stamp)
+        return place if place < len(self.all) and self.all[place] == stamp else None
 
 
 def pixels_of(picture: Any) -> Frame:
