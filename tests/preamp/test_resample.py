@@ -6,8 +6,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from gramoscope.disc.formats import direction_of_cut
 from gramoscope.errors import ArgumentError
-from gramoscope.preamp.resample import Resampler, direction_of
+from gramoscope.preamp.resample import Resampler
 from gramoscope.quality import Quality
 from gramoscope.signal_path import GrooveMotion
 from gramoscope.turntable.rotation import Rotation
@@ -141,7 +142,7 @@ def test_the_direction_chooses_the_motion():
     sound = joined(Resampler(SPIRAL, direction="vertical").resample([motion]))
     assert error_db(sound, lambda t: tone(t, 777.0)) < -110
     np.testing.assert_allclose(sound.sigma, 3e-4)
-    assert [direction_of(cut) for cut in ("lateral", "vertical", "stereo")] == ["lateral", "vertical", "lateral"]
+    assert [direction_of_cut(cut) for cut in ("lateral", "vertical", "stereo")] == ["lateral", "vertical", "lateral"]
 
 
 def test_sigma_keeps_its_size_and_its_place():

@@ -11,19 +11,12 @@ import numpy as np
 from gramoscope.apparatus.bench import Bench
 from gramoscope.apparatus.capture import Capture, spans
 from gramoscope.apparatus.frame_log import nominal_arc_m
+from gramoscope.camera.exposure import Exposure
 from gramoscope.conventions import MICROMETRES_PER_METRE, FloatArray
-from gramoscope.signal_path import FrameGroup, ImageArray
+from gramoscope.signal_path import FrameGroup
 from gramoscope.turntable.rotation import pixel_rate_hz
 
-DARK_MEAN = 0.02
-"""A frame whose mean is below this share of full scale shows no light: a guess, a third of the dimmest usable film."""
-
-DARK_CONTRAST = 0.002
-"""A frame whose standard deviation is below this share of full scale shows nothing: half a grey level of 8 bits."""
-
-SATURATED_SHARE = 0.1
-"""A frame with more than this share of its pixels at full scale has lost its texture: a guess."""
-
+EXPOSURE = Exposure()
 _SAMPLED_GROUPS = 5
 
 
@@ -164,24 +157,14 @@ def finding_of_group(group: FrameGroup) -> GroupFinding:
         Without problems when all is well. Lost frames are not counted among the dark ones.
     """
     usable = np.flatnonzero(group.valid).tolist()
-    dark = tuple(k for k in usable if is_dark(group.images[k], white_level=group.white_level))
-    saturated = tuple(k for k in usable if is_saturated(group.images[k], white_level=group.white_level))
+    dark = tuple(k for k in usable if EXPOSURE.is_dark(group.images[k], white_level=group.white_level))
+    saturated = tuple(k for k in usable if EXPOSURE.is_saturated(group.images[k], white_level=group.white_level))
     problems = list(group.problems)
     if dark:
         problems.append(f"{spans(list(dark))}: no light or no contrast")
     if saturated:
-        problems.append(f"{spans(list(saturated))}: too bright, more than {SATURATED_SHARE:.0%} at full scale")
+        problems.append(f"{spans(list(saturated))}: too bright, more than {EXPOSURE.saturated_share:.0%} at full scale")
     return GroupFinding(group.number, len(usable), dark, saturated, tuple(problems))
-
-
-def is_dark(frame: ImageArray, *, white_level: int) -> bool:
-    """Tell whether a frame shows no light or no contrast (`DARK_MEAN`, `DARK_CONTRAST`)."""
-    return bool(frame.mean() < DARK_MEAN * white_level or frame.std(dtype=np.float32) < DARK_CONTRAST * white_level)
-
-
-def is_saturated(frame: ImageArray, *, white_level: int) -> bool:
-    """Tell whether a frame is too bright (`SATURATED_SHARE`)."""
-    return bool(np.count_nonzero(frame >= white_level) > SATURATED_SHARE * frame.size)
 
 
 def _presence(capture: Capture, number: int) -> GroupFinding:

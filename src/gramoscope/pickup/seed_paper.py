@@ -15,10 +15,10 @@ from itertools import pairwise
 import numpy as np
 
 from gramoscope.apparatus.bench import Bench
+from gramoscope.camera.exposure import Exposure
 from gramoscope.conventions import FloatArray, IntArray, lateral_of_row_m, rad
 from gramoscope.errors import require
 from gramoscope.pickup.centreline import Centreline, centroids, discard_damaged_columns, fill_voids
-from gramoscope.pickup.exposure import Exposure
 from gramoscope.pickup.flow.derivatives import Derivatives, group_derivatives, texture_contrast
 from gramoscope.pickup.flow.horn_schunck import Flow, FlowMethod, GrooveHornSchunck
 from gramoscope.pickup.hough import Accumulator, Line, accumulate, peaks, segment

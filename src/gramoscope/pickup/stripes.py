@@ -189,13 +189,7 @@ class StripeModel:
         total = [assignment.score for assignment in choices[0]]
         back: list[list[int]] = []
         for border, before, after in zip(borders, choices[:-1], choices[1:], strict=True):
-            best = [
-                max(
-                    range(len(before)),
-                    key=lambda i: total[i] if self._runs_on(before[i], to, border, stripes) else -1.0,
-                )
-                for to in after
-            ]
+            best = self._best_before(total, before, after, border, stripes)
             total = [total[i] + to.score for i, to in zip(best, after, strict=True)]
             back.append(best)
         i = int(np.argmax(total))
@@ -205,10 +199,20 @@ class StripeModel:
             chosen.append(before[i])
         return chosen[::-1]
 
-    def _runs_on(self, a: Assignment, b: Assignment, column: float, stripes: Sequence[Stripe]) -> bool:
-        jump = a.middle_at(column, stripes) - b.middle_at(column, stripes)
+    def _best_before(
+        self,
+        total: Sequence[float],
+        before: Sequence[Assignment],
+        after: Sequence[Assignment],
+        column: float,
+        stripes: Sequence[Stripe],
+    ) -> list[int]:
+        """For each assignment after a border, the best one before it from which the groove can run on."""
+        here, there = (np.array([one.middle_at(column, stripes) for one in side]) for side in (before, after))
         # a segment without lines runs on from anything: its middle, and so the jump, is NaN
-        return not abs(jump) > self.largest_jump_px
+        broken = np.abs(here[:, None] - there[None, :]) > self.largest_jump_px
+        scores = np.where(broken, -1.0, np.asarray(total)[:, None])
+        return [int(i) for i in scores.argmax(axis=0)]
 
     def _score(
         self, lines: Sequence[Line], stripes: Sequence[Stripe], edge_row: float | None, glass_low: bool

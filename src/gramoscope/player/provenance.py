@@ -14,7 +14,7 @@ from gramoscope.apparatus.capture import Capture
 from gramoscope.apparatus.fingerprint import sha256_of_file
 from gramoscope.player.recipe import Recipe
 
-_LIBRARIES = ("gramoscope", "numpy", "scipy", "numba", "soxr", "soundfile", "tifffile", "zarr", "imageio")
+_LIBRARIES = ("gramoscope", "numpy", "scipy", "numba", "soxr", "soundfile", "tifffile", "zarr", "pillow")
 
 
 def versions() -> dict[str, str]:

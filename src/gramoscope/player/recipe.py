@@ -17,8 +17,8 @@ from typing import Any, TypeVar, get_type_hints
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from gramoscope.apparatus.bench import Bench
+from gramoscope.camera.exposure import Exposure
 from gramoscope.errors import ArgumentError
-from gramoscope.pickup.exposure import Exposure
 from gramoscope.pickup.flow.horn_schunck import FlowMethod, GrooveHornSchunck, HornSchunck
 from gramoscope.pickup.in_focus import InFocus
 from gramoscope.pickup.seed_paper import HoughSearch, SeedPaperPickup
@@ -89,14 +89,17 @@ def load_recipe(name_or_file: str) -> Recipe:
     ArgumentError
         If there is no such recipe, or a key is unknown or impossible.
     """
-    if name_or_file in shipped_recipes():
-        text = resources.files("gramoscope.player").joinpath("recipes", f"{name_or_file}.toml").read_text("utf-8")
-    else:
-        text = _read_file(name_or_file)
     try:
-        return recipe_of_table(tomllib.loads(text))
+        return recipe_of_table(tomllib.loads(recipe_text(name_or_file)))
     except tomllib.TOMLDecodeError as error:
         raise ArgumentError(f"recipe {name_or_file} is not valid TOML: {error}", "a TOML file") from error
+
+
+def recipe_text(name_or_file: str) -> str:
+    """Return the TOML of a recipe by its name or from a file; ArgumentError if there is none."""
+    if name_or_file in shipped_recipes():
+        return resources.files("gramoscope.player").joinpath("recipes", f"{name_or_file}.toml").read_text("utf-8")
+    return _read_file(name_or_file)
 
 
 def _read_file(name: str) -> str:

@@ -11,27 +11,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import chain
-from typing import Literal
 
 import numpy as np
 
 from gramoscope.conventions import FloatArray
-from gramoscope.disc.formats import Cut
+from gramoscope.disc.formats import Direction
 from gramoscope.errors import require
 from gramoscope.preamp.interpolation import half_width, interpolate, low_pass_table
 from gramoscope.quality import FlagArray, Quality, no_flags
 from gramoscope.signal_path import Audio, GrooveMotion
 from gramoscope.turntable.rotation import Rotation
 
-Direction = Literal["lateral", "vertical"]
-
 DEFAULT_PASSBAND = 0.91
 """Share of the Nyquist rate that is passed flat: 20.07 kHz of 44.1."""
-
-
-def direction_of(cut: Cut) -> Direction:
-    """Return the direction of the sound; a stereo groove played as mono is its lateral motion."""
-    return "vertical" if cut == "vertical" else "lateral"
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,70 @@
+"""The command `gramoscope`.
+
+Commands import what they need when they run, so that help comes at once.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from importlib.metadata import version
+
+import cyclopts
+
+from gramoscope.cli.compare import compare
+from gramoscope.cli.demo import demo
+from gramoscope.cli.film import film
+from gramoscope.cli.info import info
+from gramoscope.cli.play import play
+from gramoscope.cli.recipe import recipe
+from gramoscope.cli.terminal import BAD_INPUT, FINE, INTERRUPTED, show_error
+from gramoscope.errors import GramoscopeError
+
+app = cyclopts.App(
+    name="gramoscope",
+    help="""Play gramophone records with light.
+
+    A microscope films the groove of a slowly turning record through an objective with two focal planes; Gramoscope turns the
+    film into sound, with error bars.
+
+    First steps, without a record:
+
+    - `gramoscope demo` films a sound of its own, plays the film and says how well that went;
+    - `gramoscope film SOUND CAPTURE` films any sound file;
+    - `gramoscope play CAPTURE --out DIR` plays a film.
+
+    Exit codes: 0 all is well; 1 `info` found something wrong; 2 the command cannot work as given; 130 stopped by Ctrl-C.
+    """,
+    help_format="markdown",
+    version=version("gramoscope"),
+    suppress_keyboard_interrupt=False,
+    result_action="return_value",
+)
+for command in (demo, film, play, compare, info, recipe):
+    app.command(command)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command line.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Those of the process when left out.
+
+    Returns
+    -------
+    int
+        Exit code, see `gramoscope.cli.terminal`.
+    """
+    try:
+        result = app(arguments if arguments is None else list(arguments), exit_on_error=False)
+    except cyclopts.CycloptsError:
+        return BAD_INPUT
+    except GramoscopeError as error:
+        show_error(error)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        sys.stderr.write("\nStopped. No half-written file was left.\n")
+        return INTERRUPTED
+    return result if isinstance(result, int) else FINE

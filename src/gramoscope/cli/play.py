@@ -1,0 +1,90 @@
+"""`gramoscope play`: a capture in, sound files, a report and a picture out."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from gramoscope.cli.terminal import FINE, Terminal
+
+
+def play(
+    capture: Path,
+    /,
+    *,
+    out: Path,
+    recipe: str = "seed-paper",
+    rate: int = 96_000,
+    characteristic: str | None = None,
+    workers: Annotated[int, Parameter(show_default=False)] = os.cpu_count() or 1,
+    quiet: bool = False,
+    json: bool = False,
+) -> int:
+    """Play a filmed record.
+
+    Writes `flat.wav` (velocity of the groove in the direction of the cut, 24 bit, no equalisation), `equalised.wav`,
+    `report.json` and `groove.png` into DIR: all of them, or nothing.
+
+    What the film does not show (a chipped wall, a lost frame) is bridged, flagged and counted in the report.
+
+    Parameters
+    ----------
+    capture
+        Folder with `capture.toml` and frames.
+    out
+        Folder for the results; made if it does not exist. An earlier transfer in it is replaced.
+    recipe
+        How to read: a name that ships with us, or a TOML file. `gramoscope recipe` shows them.
+    rate
+        Samples a second.
+    characteristic
+        Recording characteristic to undo in `equalised.wav`: riaa, flat, aes, nab, columbia-lp, european-78, … As the capture
+        says when left out, riaa (as in the paper) if it does not.
+    workers
+        Stretches read at the same time; one for each processor when left out. The result does not depend on it.
+    quiet
+        Say nothing.
+    json
+        Print the report as JSON.
+    """
+    from gramoscope.apparatus.capture import open_capture
+    from gramoscope.player.play import Settings
+    from gramoscope.player.play import play as play_capture
+    from gramoscope.player.recipe import load_recipe
+
+    terminal = Terminal(quiet, json)
+    opened = open_capture(capture)
+    name = characteristic or opened.bench.disc.characteristic or "riaa"
+    settings = Settings(rate_hz=float(rate), characteristic_name=name, workers=workers)
+    with terminal.progress("Playing") as progress:
+        report = play_capture(opened, load_recipe(recipe), out, settings, progress=progress)
+    terminal.result(report)
+    tell(terminal, report, out)
+    return FINE
+
+
+def tell(terminal: Terminal, report: Mapping[str, Any], out: Path) -> None:
+    """Say in a few lines what a transfer is worth and where it lies."""
+    noise, share, groups = report["noise_estimate"], report["share"], report["groups"]
+    level = report["level"]
+    rows = {
+        "played": f"{report['seconds']:.3f} s in {report['elapsed_s']:.1f} s, recipe {report['recipe'].get('name', '?')}",
+        "groups": f"{groups['read']} read, {groups['lost']} lost; {report['frames_lost']} frames lost",
+        "measured": f"{share['measured']:.1%} of the sound; {share['interpolated']:.1%} interpolated and flagged",
+        "level": f"{level['rms_cm_s']:.2f} cm/s rms, {level['peak_cm_s']:.1f} cm/s peak",
+        "noise": f"{noise['sigma_rms_cm_s']:.2f} cm/s rms by the error bars, {noise['signal_to_noise_db']:.1f} dB below",
+        "equalised": f"{report['files']['equalised.wav']['characteristic']}",
+        "files": "  ".join(str(out / name) for name in ("flat.wav", "equalised.wav", "groove.png", "report.json")),
+    }
+    terminal.table(rows)
+    for remark in report["remarks"]:
+        terminal.say(f"[yellow]Note:[/] {remark}")
+    for problem in report["problems"][:5]:
+        terminal.say(f"[yellow]Found:[/] {problem}")
+    more = len(report["problems"]) - 5 + report["problems_not_listed"]
+    if more > 0:
+        terminal.say(f"[yellow]Found:[/] {more} more problems; they are in report.json")
