@@ -61,6 +61,11 @@ def test_more_dust_does_not_move_the_chips() -> None:
     assert chips(dusty) == chips(Damage(chips_per_m=200)) != []
 
 
+def test_different_marks_lie_in_different_places() -> None:
+    places = [mark.centre_m[0] for mark in HEAVY_DAMAGE.marks(0.0, 0.1, **PLACE)]
+    assert len(set(places)) == len(places) > 100
+
+
 def test_chips_lie_on_the_walls_and_leave_a_deep_irregular_hole() -> None:
     for mark in HEAVY_DAMAGE.marks(0.0, 0.2, **PLACE):
         if isinstance(mark, Chip):

@@ -40,6 +40,12 @@ def test_arc_length_grows_by_the_length_of_the_surface() -> None:
     np.testing.assert_allclose(points[1:, 2] - points[0, 2], walked_m, atol=1e-11)
 
 
+def test_the_slope_is_the_derivative_of_the_height() -> None:
+    across_m = np.linspace(-69e-6, 69e-6, 20_001)
+    points = np.array([section(x, UNEVEN.shape) for x in across_m])
+    np.testing.assert_allclose(np.gradient(points[:, 0], across_m)[1:-1], points[1:-1, 1], atol=2e-3)
+
+
 def test_a_lift_moves_the_walls_and_leaves_the_land() -> None:
     across_m = np.array([-90e-6, -50e-6, 11e-6, 66e-6])
     lifted = UNEVEN.height_m(across_m, lift_m=7e-6)

@@ -33,9 +33,9 @@ def _still(scene: Scene, lateral_m: float = 0.0, vertical_m: float = 0.0) -> Pas
     return Passage(_Still(lateral_m, vertical_m), scene.bench.rotation, Wow())
 
 
-def _sharp_rows(scene: Scene, passage: Passage) -> np.ndarray:
+def _sharp_rows(scene: Scene, passage: Passage, *, groups: tuple[int, ...] = (0, 1, 2, 3, 4)) -> np.ndarray:
     """Rows of the three sharp stripes, from where the fine contrast has its centre of gravity near each peak."""
-    images = np.concatenate([render_group(scene, passage, number) for number in range(5)], axis=2).astype(float)
+    images = np.concatenate([render_group(scene, passage, number) for number in groups], axis=2).astype(float)
     fine = np.diff(images.mean(axis=0), axis=1).var(axis=1)
     found, left = [], fine.copy()
     for _ in range(3):
@@ -71,6 +71,13 @@ def test_a_steeper_wall_stands_nearer_to_its_edge(quiet: Scene) -> None:
     pitch_m, depths_m = quiet.bench.sensor.pixel_pitch_m, (57.39e-6, 20e-6)
     inner = [depth * (1 - 1 / np.tan(rad(48.0))) / pitch_m for depth in depths_m]
     np.testing.assert_allclose(shift, [0, *inner], atol=1.0)
+
+
+def test_focus_that_drifts_up_moves_the_stripes_towards_the_edges(quiet: Scene) -> None:
+    drifting = replace(quiet, rig=Rig(focus_drift_m=8e-6, focus_drift_groups=2))
+    rows = [_sharp_rows(scene, _still(scene), groups=(2,)) for scene in (quiet, drifting)]
+    up_px = 8e-6 / quiet.bench.sensor.pixel_pitch_m
+    np.testing.assert_allclose(rows[1] - rows[0], [-up_px, up_px, up_px], atol=3)
 
 
 def test_the_frames_of_a_group_are_one_picture_that_slides(quiet: Scene, sound: np.ndarray) -> None:
