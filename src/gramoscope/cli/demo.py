@@ -38,7 +38,6 @@ def demo(
     from gramoscope.apparatus.capture import open_capture
     from gramoscope.cli import compare as compare_command
     from gramoscope.cli import play as play_command
-    from gramoscope.cli.film import film_sound
     from gramoscope.listening.compare import compare
     from gramoscope.listening.comparison_figure import comparison_figure
     from gramoscope.listening.ink import save_png
@@ -47,6 +46,7 @@ def demo(
     from gramoscope.player.play import Settings, play
     from gramoscope.player.recipe import DEFAULT_RECIPE, load_recipe
     from gramoscope.simulation.demo_sound import demo_sound
+    from gramoscope.simulation.film_sound import film_sound
     from gramoscope.simulation.scene import filming_bench, named_scene
 
     terminal = Terminal(quiet, json)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -14,7 +13,6 @@ from gramoscope.cli.terminal import FINE, Terminal
 
 if TYPE_CHECKING:
     from gramoscope.conventions import FloatArray
-    from gramoscope.simulation.scene import Scene
 
 LONGEST_UNASKED_S = 0.25
 """So much of a longer sound is filmed when nobody says how much: half a thousand groups, four gigabytes."""
@@ -97,6 +95,7 @@ def film(
         Print what was made as JSON.
     """
     from gramoscope.apparatus.manifest import read_bench
+    from gramoscope.simulation.film_sound import film_sound
     from gramoscope.simulation.scene import filming_bench, named_scene
 
     terminal = Terminal(quiet, json)
@@ -135,41 +134,6 @@ def film(
         )
     tell(terminal, capture)
     return FINE
-
-
-def film_sound(
-    samples: FloatArray,
-    rate_hz: float,
-    scene: Scene,
-    capture: Path,
-    layout: Literal["tiff", "png", "zarr", "video"],
-    *,
-    compress: bool = False,
-    overwrite: bool = False,
-    workers: int = 2,
-    progress: Callable[[int, int], None] | None = None,
-) -> None:
-    """Film all of a sound with the characteristic that the scene's disc names, and put the truth beside it."""
-    from gramoscope.apparatus.capture_writer import CaptureWriter
-    from gramoscope.disc.characteristic_filter import recording_filter
-    from gramoscope.disc.characteristics import characteristic
-    from gramoscope.simulation.film import film as film_scene
-    from gramoscope.simulation.truth import save_truth
-
-    recording = recording_filter(characteristic(scene.bench.disc.characteristic or "flat"), rate_hz=rate_hz)
-    channels = samples.reshape(len(samples), -1)
-    cut = recording.apply(channels[:, 0]) if channels.shape[1] == 1 else _each(recording.apply, channels)
-    scene = scene.lasting(len(samples) / rate_hz)
-    lost: Literal["leave out", "black"] = "black" if layout == "video" else "leave out"
-    with CaptureWriter(capture, scene.bench, layout=layout, compress=compress, overwrite=overwrite) as writer:
-        passage = film_scene(cut, rate_hz, scene, writer, workers=workers, lost=lost, progress=progress)
-    save_truth(capture, scene, passage)
-
-
-def _each(apply: Callable[[FloatArray], FloatArray], channels: FloatArray) -> FloatArray:
-    import numpy as np
-
-    return np.column_stack([apply(np.ascontiguousarray(channels[:, i])) for i in range(channels.shape[1])])
 
 
 def _sound(
