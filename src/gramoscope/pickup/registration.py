@@ -66,6 +66,25 @@ def cubic_taps(fraction: float) -> tuple[float, float, float, float]:
 
 
 @numba.njit(cache=True, nogil=True)
+def quintic_taps(fraction: float) -> tuple[float, float, float, float, float, float]:
+    """Return the six weights of Lagrange's interpolation at `fraction` (0 … 1) between the middle two samples.
+
+    Exact for polynomials up to the fifth degree. Textures with a period of six pixels it delays by the fraction to 1 %,
+    Catmull–Rom to 14 %, which biased shifts by up to 0.009 pixels: a search for shifts needs the better one.
+    """
+    f = fraction
+    a, b, c, d, e, g = f + 2, f + 1, f, f - 1, f - 2, f - 3
+    return (
+        -b * c * d * e * g / 120,
+        a * c * d * e * g / 24,
+        -a * b * d * e * g / 12,
+        a * b * c * e * g / 12,
+        -a * b * c * d * g / 24,
+        a * b * c * d * e / 120,
+    )
+
+
+@numba.njit(cache=True, nogil=True)
 def _add_row(row, start, stop, offset, taps, weight, total, moment):  # type: ignore[no-untyped-def]
     w0, w1, w2, w3 = taps
     w0, w1, w2, w3 = np.float32(w0), np.float32(w1), np.float32(w2), np.float32(w3)
@@ -169,12 +188,13 @@ def _texture_of_rows(image):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _row_normal_equation(here, there, offset, taps, start, stop):  # type: ignore[no-untyped-def]
-    w0, w1, w2, w3 = taps
+    w0, w1, w2, w3, w4, w5 = taps
     square = 0.0
     cross = 0.0
     for x in range(start, stop):
         i = x + offset
-        moved = w0 * there[i - 1] + w1 * there[i] + w2 * there[i + 1] + w3 * there[i + 2]
+        moved = w0 * there[i - 2] + w1 * there[i - 1] + w2 * there[i] + w3 * there[i + 1]
+        moved += w4 * there[i + 2] + w5 * there[i + 3]
         gradient = 0.25 * (float(here[x + 2]) + float(here[x + 1]) - float(here[x - 1]) - float(here[x - 2])) / 1.5
         square += gradient * gradient
         cross += gradient * (moved - float(here[x]))
@@ -185,8 +205,9 @@ def _row_normal_equation(here, there, offset, taps, start, stop):  # type: ignor
 def _shift_correction(here, there, rows, shift_px):  # type: ignore[no-untyped-def]
     width = here.shape[1]
     start, stop, offset, fraction = _placement(shift_px, width, width)
-    start, stop = max(start, 2), min(stop, width - 2)
-    taps = cubic_taps(fraction)
+    # two more taps than `_placement` makes room for, and a gradient of five columns
+    start, stop = max(start + 1, 2), min(stop - 1, width - 2)
+    taps = quintic_taps(fraction)
     square = 0.0
     cross = 0.0
     for row in rows:
