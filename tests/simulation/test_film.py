@@ -9,6 +9,7 @@ import pytest
 from gramoscope.errors import ArgumentError, OutputError
 from gramoscope.simulation.demo_sound import demo_sound
 from gramoscope.simulation.film import film
+from gramoscope.simulation.passage import Passage
 from gramoscope.simulation.render import filmed_group
 from gramoscope.simulation.rig import ROUGH_RIG, Rig
 from gramoscope.simulation.scene import Scene, filming_bench, named_scene
@@ -39,6 +40,22 @@ def test_one_worker_and_three_make_the_same_film(small: Scene, sound: np.ndarray
     assert list(one.groups) == list(three.groups) == [0, 1, 2, 3, 4]
     for number, images in one.groups.items():
         np.testing.assert_array_equal(images, three.groups[number])
+
+
+def test_no_more_than_one_group_a_worker_waits_in_memory(
+    small: Scene, sound: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: list[int] = []
+    waiting: list[int] = []
+
+    def instantly(scene: Scene, passage: Passage, number: int) -> np.ndarray:
+        begun.append(number)
+        return np.zeros((3, 4, 5), np.uint8)
+
+    monkeypatch.setattr("gramoscope.simulation.film.render_group", instantly)
+    long = replace(small, bench=replace(small.bench, sequence=replace(small.bench.sequence, groups=60)))
+    film(sound, 48_000.0, long, _Shelf(), workers=2, progress=lambda done, total: waiting.append(len(begun) - done))
+    assert max(waiting) <= 2
 
 
 def test_progress_is_told_and_the_log_is_nominal(small: Scene, sound: np.ndarray) -> None:
