@@ -111,8 +111,9 @@ class WallTrace:
         turned from one stretch to the next.
     frame_step_m : float64 array, shape (frame − 1,)
         How far the record really turned from frame to frame, by the flow; NaN where it could not be seen.
-    noise_share : float
-        Standard deviation of the camera noise over that of the texture in focus; NaN when unknown.
+    wall_angle_rad : float64 array, shape (2,)
+        Angle of each wall against the land, by the distance of its stripes and their depths; NaN for a wall that does not
+        show two. A wrong angle means a wrong glass, pixel pitch or wall.
     problems : tuple of str
     """
 
@@ -128,7 +129,7 @@ class WallTrace:
     head: Texture | None = None
     tail: Texture | None = None
     frame_step_m: FloatArray = field(default_factory=lambda: np.empty(0))
-    noise_share: float = float("nan")
+    wall_angle_rad: FloatArray = field(default_factory=lambda: np.full(2, np.nan))
     problems: tuple[str, ...] = ()
 
 

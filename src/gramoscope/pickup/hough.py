@@ -174,11 +174,10 @@ def segment(
     int array, shape (point,)
         Number of the line; −1 for a point in no region, −2 for a disputed one, in two or more.
     """
-    inside = np.array(
-        [belongs(rows, columns, line, theta_reach_rad=theta_reach_rad, rho_reach_px=rho_reach_px) for line in lines]
-    ).reshape(len(lines), -1)
-    claims = inside.sum(axis=0)
     label = np.full(np.asarray(rows).shape, -1, np.int64)
-    if lines:
-        label = np.where(claims == 1, inside.argmax(axis=0), np.where(claims > 1, -2, -1))
-    return label
+    claims = np.zeros(label.shape, np.int64)
+    for number, line in enumerate(lines):
+        inside = belongs(rows, columns, line, theta_reach_rad=theta_reach_rad, rho_reach_px=rho_reach_px)
+        label[inside] = number
+        claims += inside
+    return np.where(claims > 1, -2, label)

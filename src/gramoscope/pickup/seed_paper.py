@@ -25,7 +25,7 @@ from gramoscope.pickup.hough import Accumulator, Line, accumulate, peaks, segmen
 from gramoscope.pickup.in_focus import InFocus
 from gramoscope.pickup.registration import Canvas, frame_shifts, register
 from gramoscope.pickup.stripes import Stripe, StripeModel, expected_stripes, kept_stripes
-from gramoscope.pickup.wall import Planes, WallOrientation
+from gramoscope.pickup.wall import Planes, WallOrientation, wall_angle_rad
 from gramoscope.pickup.wall_samples import WallSamples, samples_of_wall
 from gramoscope.quality import Quality, no_flags
 from gramoscope.signal_path import FrameGroup, Texture, WallTrace
@@ -318,7 +318,7 @@ class SeedPaperPickup:
             rows = np.array([lines[i].row for i in mine])
             measured = np.array([lines[i].measured for i in mine])
             planes = self.orientation.fit(rows, measured)
-            samples[wall] = samples_of_wall(
+            sample = samples_of_wall(
                 planes,
                 rows,
                 measured,
@@ -326,6 +326,12 @@ class SeedPaperPickup:
                 line_slope=_line_slope(segments, mine, stations),
                 expected_row=np.array([stripes[i].row for i in mine]),
             )
+            angle = wall_angle_rad(
+                planes,
+                depth_below_land_m=np.array([stripes[i].depth_below_land_m for i in mine]),
+                pixel_pitch_m=self.bench.sensor.pixel_pitch_m,
+            )
+            samples[wall] = replace(sample, wall_angle_rad=angle)
         return planes, samples
 
     def _trace(
@@ -336,6 +342,7 @@ class SeedPaperPickup:
         pitch = group.pixel_pitch_m
         stations = next(iter(samples.values())).slope.size
         offset, offset_sigma, slope, slope_sigma = (np.full((2, stations), np.nan) for _ in range(4))
+        angle = np.full(2, np.nan)
         wall_flags = np.full((2, stations), Quality.NO_STRIPE | Quality.INTERPOLATED, np.uint16)
         for wall, sample in samples.items():
             offset[wall] = lateral_of_row_m(
@@ -347,6 +354,7 @@ class SeedPaperPickup:
             offset_sigma[wall] = pitch * sample.row_sigma_px
             slope[wall], slope_sigma[wall] = sample.slope, sample.slope_sigma
             wall_flags[wall] = sample.flags | np.uint16(flags)
+            angle[wall] = sample.wall_angle_rad
         return WallTrace(
             number=group.number,
             arc_start_m=float(group.arc_start_m[first]),
@@ -357,6 +365,7 @@ class SeedPaperPickup:
             slope_sigma=slope_sigma,
             correlation_samples=self.orientation.correlation_samples,
             flags=wall_flags,
+            wall_angle_rad=angle,
             frame_step_m=step_m,
             problems=group.problems,
         )

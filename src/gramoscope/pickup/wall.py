@@ -220,6 +220,31 @@ def fit_planes(
     return Planes(slope, sigma, at, scatter, points, kept)
 
 
+def wall_angle_rad(planes: Planes, *, depth_below_land_m: FloatArray, pixel_pitch_m: float) -> float:
+    """Return the angle of a wall against the land, φ = atan(Δq/Δl), from its two stripes.
+
+    Parameters
+    ----------
+    planes : Planes
+        Fitted to two lines.
+    depth_below_land_m : float64 array, shape (2,)
+        Depth q of each line.
+    pixel_pitch_m : float
+
+    Returns
+    -------
+    float
+        0 … π/2, the median over the stations; NaN when no station saw both lines, or for a wall with one.
+    """
+    if planes.row.shape[0] != 2:
+        return float("nan")
+    apart_m = np.abs(planes.row[1] - planes.row[0]) * pixel_pitch_m
+    apart_m = apart_m[np.isfinite(apart_m)]
+    if apart_m.size == 0:
+        return float("nan")
+    return float(np.arctan2(abs(depth_below_land_m[1] - depth_below_land_m[0]), np.median(apart_m)))
+
+
 def correlation_length_px(residual: FloatArray, *, reach_px: int = 12) -> float:
     """Return 1 + 2 Σ ρ_k: over how many columns the errors of a centroid line are one and the same.
 

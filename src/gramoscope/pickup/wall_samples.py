@@ -32,6 +32,8 @@ class WallSamples:
         Row of the wall (the mean over its stripes at their expected distances), and its standard error.
     slope, slope_sigma : float64 arrays, shape (station,)
     flags : uint16 array, shape (station,)
+    wall_angle_rad : float
+        Angle of the wall against the land, NaN when it shows one stripe only.
     """
 
     row_px: FloatArray
@@ -39,6 +41,7 @@ class WallSamples:
     slope: FloatArray
     slope_sigma: FloatArray
     flags: FlagArray
+    wall_angle_rad: float = float("nan")
 
 
 def residuals(planes: Planes, rows: FloatArray, measured: npt.NDArray[np.bool_], stations: FloatArray) -> FloatArray:

@@ -60,6 +60,8 @@ class Monitor:
     frame_step_sum_m: float = 0.0
     frame_step_square_m2: float = 0.0
     frame_steps: int = 0
+    wall_angle_sum_deg: FloatArray = field(default_factory=lambda: np.zeros(2))
+    wall_angles: FloatArray = field(default_factory=lambda: np.zeros(2))
     matches: int = 0
     matches_missing: int = 0
     match_square_m2: float = 0.0
@@ -87,6 +89,9 @@ class Monitor:
             self.pickup_samples += flags.size
             for name, number in count(flags).items():
                 self.pickup_flags[name] = self.pickup_flags.get(name, 0) + number
+        known = np.isfinite(trace.wall_angle_rad)
+        self.wall_angle_sum_deg = self.wall_angle_sum_deg + np.where(known, np.rad2deg(trace.wall_angle_rad), 0.0)
+        self.wall_angles = self.wall_angles + known
         steps = trace.frame_step_m[np.isfinite(trace.frame_step_m)]
         self.frame_steps += steps.size
         self.frame_step_sum_m += float(steps.sum())
@@ -152,6 +157,12 @@ class Monitor:
                 "measured_mean_um": 1e6 * mean_step,
                 "measured_spread_um": 1e6 * float(np.sqrt(max(variance, 0.0))),
                 "steps_measured": self.frame_steps,
+            },
+            "wall_angle_deg": {
+                name: float(total / number) if number else float("nan")
+                for name, total, number in zip(
+                    ("inner", "outer"), self.wall_angle_sum_deg, self.wall_angles, strict=True
+                )
             },
             "group_positions": {
                 "overlaps_matched": self.matches,
