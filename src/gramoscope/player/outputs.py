@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 
 from gramoscope.errors import OutputError
 from gramoscope.listening.ink import save_png
-from gramoscope.listening.report import write_json
+from gramoscope.listening.report import json_text
 from gramoscope.listening.wav import WavWriter
+from gramoscope.listening.whole_file import written_whole
 
 FLAT, EQUALISED, REPORT, PICTURE = "flat.wav", "equalised.wav", "report.json", "groove.png"
 
@@ -52,15 +53,18 @@ class Outputs:
         return self
 
     def finish(self, report: Mapping[str, Any], picture: Figure) -> None:
-        """Put everything under its name."""
+        """Complete everything under temporary names, then put all of it in place."""
+        text = json_text(report)
         self.flat.finish()
         self.equalised.finish()
-        # whoever sees a report sees a whole transfer: an old one goes first, the new one comes last
-        (self.folder / REPORT).unlink(missing_ok=True)
-        save_png(picture, self.folder / PICTURE)
-        self.flat.commit()
-        self.equalised.commit()
-        write_json(self.folder / REPORT, report)
+        with written_whole(self.folder / REPORT) as report_part, written_whole(self.folder / PICTURE) as picture_part:
+            report_part.write_text(text, encoding="utf-8")
+            save_png(picture, picture_part)
+            # nothing large is left to do: from here on an old transfer makes way. Whoever sees a report sees a whole
+            # transfer, so the old one goes first and the new one comes last, when the block ends
+            (self.folder / REPORT).unlink(missing_ok=True)
+            self.flat.commit()
+            self.equalised.commit()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -76,7 +80,9 @@ class Outputs:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise OutputError(
-                f"{self.folder} cannot be made: {error.strerror}", "a folder to write into", "choose another --out"
+                f"the folder {self.folder} cannot be made: {error.strerror}",
+                "a place where a folder can be made",
+                "choose another --out",
             ) from error
         self._made = missing
 

@@ -18,7 +18,7 @@ import numpy as np
 from gramoscope.apparatus.capture import Capture
 from gramoscope.disc.characteristics import characteristic
 from gramoscope.disc.formats import direction_of_cut
-from gramoscope.errors import CaptureError
+from gramoscope.errors import CaptureError, require
 from gramoscope.player.monitor import OVERVIEW_POINTS, Monitor
 from gramoscope.player.outputs import Outputs
 from gramoscope.player.picture import groove_picture
@@ -41,6 +41,7 @@ class Settings:
     Parameters
     ----------
     rate_hz : float
+        A whole number of samples a second, 1000 … 1 000 000.
     characteristic_name : str
         Recording characteristic to undo in `equalised.wav`.
     workers : int
@@ -49,6 +50,13 @@ class Settings:
     rate_hz: float = 96_000.0
     characteristic_name: str = "riaa"
     workers: int = os.cpu_count() or 1
+
+    def __post_init__(self) -> None:
+        possible = 1000 <= self.rate_hz <= 1_000_000 and self.rate_hz == round(self.rate_hz)
+        require(
+            possible, f"a rate of {self.rate_hz:g} Hz", "a whole number from 1000 to 1000000", "96000 for an archive"
+        )
+        require(self.workers >= 1, f"{self.workers} workers", "at least one")
 
 
 def play(

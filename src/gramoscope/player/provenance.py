@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import platform
 import sys
 from dataclasses import asdict, dataclass, field
@@ -12,7 +13,7 @@ from typing import Any
 
 from gramoscope.apparatus.capture import Capture
 from gramoscope.apparatus.fingerprint import sha256_of_file
-from gramoscope.player.recipe import Recipe
+from gramoscope.player.recipe import Recipe, table_of_recipe
 
 _LIBRARIES = ("gramoscope", "numpy", "scipy", "numba", "soxr", "soundfile", "tifffile", "zarr", "pillow")
 
@@ -33,9 +34,10 @@ def bench_of(capture: Capture) -> dict[str, Any]:
 
 
 def recipe_of(recipe: Recipe) -> dict[str, Any]:
-    """Return the recipe as written, and its hash."""
-    source = dict(recipe.source)
-    return {**source, "sha256": hashlib.sha256(repr(sorted(source.items())).encode()).hexdigest()}
+    """Return the recipe with all its parameters, and a sum over what it does: the same for the same under another name."""
+    table = table_of_recipe(recipe)
+    choices = {name: part for name, part in table.items() if name not in ("name", "about")}
+    return {**table, "sha256": hashlib.sha256(json.dumps(choices, sort_keys=True).encode()).hexdigest()}
 
 
 @dataclass

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, asdict, dataclass, field, fields
 from difflib import get_close_matches
 from importlib import resources
 from pathlib import Path
@@ -29,6 +29,7 @@ from gramoscope.tonearm.follow import KalmanSmoother
 from gramoscope.tonearm.splice import Splice
 
 DEFAULT_RECIPE = "seed-paper"
+CARTRIDGE = "seed-paper"
 _FLOWS: dict[str, type[FlowMethod]] = {"horn-schunck": HornSchunck, "groove-horn-schunck": GrooveHornSchunck}
 _PICKUP_PARTS = {
     "exposure": Exposure,
@@ -53,8 +54,6 @@ class Recipe:
     smoother : KalmanSmoother
     passband : float
         Of the resampler.
-    source : dict
-        The recipe as it was written, for the report.
     """
 
     name: str
@@ -63,7 +62,6 @@ class Recipe:
     splice: Splice = field(default_factory=Splice)
     smoother: KalmanSmoother = field(default_factory=KalmanSmoother)
     passband: float = DEFAULT_PASSBAND
-    source: Mapping[str, Any] = field(default_factory=dict)
 
     def pickup_for(self, bench: Bench) -> SeedPaperPickup:
         """Return the cartridge, fitted to an apparatus."""
@@ -90,9 +88,10 @@ def load_recipe(name_or_file: str) -> Recipe:
         If there is no such recipe, or a key is unknown or impossible.
     """
     try:
-        return recipe_of_table(tomllib.loads(recipe_text(name_or_file)))
+        table = tomllib.loads(recipe_text(name_or_file))
     except tomllib.TOMLDecodeError as error:
         raise ArgumentError(f"recipe {name_or_file} is not valid TOML: {error}", "a TOML file") from error
+    return recipe_of_table({"name": Path(name_or_file).stem, **table})
 
 
 def recipe_text(name_or_file: str) -> str:
@@ -123,21 +122,35 @@ def recipe_of_table(table: Mapping[str, Any]) -> Recipe:
     _only(tonearm, ("splice", "smoother"), "[tonearm]")
     _only(preamp, ("passband",), "[preamp]")
     return Recipe(
-        name=str(table.get("name", "unnamed")),
-        about=str(table.get("about", "")),
+        name=_checked(str, table.get("name", "unnamed"), "name"),
+        about=_checked(str, table.get("about", ""), "about"),
         pickup=_pickup_of_table(pickup),
         splice=build(Splice, _table(tonearm, "splice"), "[tonearm.splice]"),
         smoother=build(KalmanSmoother, _table(tonearm, "smoother"), "[tonearm.smoother]"),
         passband=_checked(float, preamp.get("passband", DEFAULT_PASSBAND), "[preamp] passband"),
-        source=dict(table),
     )
+
+
+def table_of_recipe(recipe: Recipe) -> dict[str, Any]:
+    """Return a recipe with every one of its parameters, those it left out included; `recipe_of_table` reads it back."""
+    cartridge = recipe.pickup_for(Bench())
+    pickup = asdict(cartridge)
+    del pickup["bench"]
+    method = next(name for name, kind in _FLOWS.items() if type(cartridge.flow) is kind)
+    return {
+        "name": recipe.name,
+        "about": recipe.about,
+        "pickup": {"cartridge": CARTRIDGE, **pickup, "flow": {"method": method, **pickup["flow"]}},
+        "tonearm": {"splice": asdict(recipe.splice), "smoother": asdict(recipe.smoother)},
+        "preamp": {"passband": recipe.passband},
+    }
 
 
 def _pickup_of_table(table: Mapping[str, Any]) -> dict[str, Any]:
     _only(table, ("cartridge", "smoothing_px", "flow", *_PICKUP_PARTS), "[pickup]")
-    cartridge = table.get("cartridge", "seed-paper")
-    if cartridge != "seed-paper":
-        raise ArgumentError(f"[pickup] cartridge = {cartridge!r}", '"seed-paper"')
+    cartridge = table.get("cartridge", CARTRIDGE)
+    if cartridge != CARTRIDGE:
+        raise ArgumentError(f"[pickup] cartridge = {cartridge!r}", f'"{CARTRIDGE}"')
     parts: dict[str, Any] = {
         name: build(kind, _table(table, name), f"[pickup.{name}]") for name, kind in _PICKUP_PARTS.items()
     }
@@ -174,15 +187,29 @@ def build(kind: type[Part], table: Mapping[str, Any], where: str) -> Part:
     if missing:
         raise ArgumentError(f"{where} lacks {', '.join(missing)}", "a value for each")
     hints = get_type_hints(kind)
-    return kind(**{name: _checked(hints[name], value, f"{where} {name}") for name, value in table.items()})
+    checked = {name: _checked(hints[name], value, f"{where} {name}") for name, value in table.items()}
+    try:
+        return kind(**checked)
+    except ArgumentError as error:
+        raise ArgumentError(f"{where}: {error.found}", error.needed, error.remedy) from error
 
 
 def _checked(hint: Any, value: Any, where: str) -> Any:
+    # TOML has no tuples, and pydantic's strictness (no "0.5" for 0.5, no true for 1) wants them
+    given = tuple(value) if isinstance(value, list) else value
     try:
-        return TypeAdapter(hint, config=ConfigDict(allow_inf_nan=False)).validate_python(value)
+        return TypeAdapter(hint, config=ConfigDict(allow_inf_nan=False, strict=True)).validate_python(given)
     except ValidationError as error:
-        problem = error.errors()[0]
-        raise ArgumentError(f"{where} = {value!r}", problem["msg"].lower()) from error
+        needed = _IN_WORDS.get(hint, error.errors()[0]["msg"].lower())
+        raise ArgumentError(f"{where} = {value!r}", needed) from error
+
+
+_IN_WORDS: dict[Any, str] = {
+    float: "a finite number",
+    int: "a whole number",
+    str: "a text",
+    tuple[float, float]: "two finite numbers",
+}
 
 
 def _only(table: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
