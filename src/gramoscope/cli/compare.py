@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from gramoscope.cli.terminal import FINE, Terminal
+from gramoscope.cli.terminal import FINE, FINITE, Terminal
 
 if TYPE_CHECKING:
     from gramoscope.conventions import FloatArray
@@ -17,10 +17,10 @@ def compare(
     b: Path,
     /,
     *,
-    band: tuple[float, float] = (200.0, 10_000.0),
-    start: float = 0.0,
-    trim_ms: float = 0.0,
-    max_delay_ms: float = 50.0,
+    band: Annotated[tuple[float, float], FINITE] = (200.0, 10_000.0),
+    start: Annotated[float, FINITE] = 0.0,
+    trim_ms: Annotated[float, FINITE] = 0.0,
+    max_delay_ms: Annotated[float, FINITE] = 50.0,
     channel: int | None = None,
     picture: Path | None = None,
     quiet: bool = False,
@@ -59,13 +59,14 @@ def compare(
     from gramoscope.listening.pair import one_channel
     from gramoscope.listening.truth import load_for_comparison
 
-    require(trim_ms >= 0 and max_delay_ms >= 0 and start >= 0, "a negative time", "zero or more")
+    for name, value in (("--start", start), ("--trim-ms", trim_ms), ("--max-delay-ms", max_delay_ms)):
+        require(value >= 0, f"{name} {value:g}", "zero or more")
     terminal = Terminal(quiet, json)
     one, one_rate_hz = load_for_comparison(a)
     other, other_rate_hz = load_for_comparison(b)
     original, copy = (one_channel(sound, channel=channel) for sound in (one, other))
     original = original[round(start * one_rate_hz) :]
-    require(original.size > 1, f"{a} ends before {start:g} s", "a --start within the sound")
+    require(original.size > 0, f"{a} ends before {start:g} s", "a --start within the sound")
     result = compare_sounds(
         original,
         one_rate_hz,
@@ -93,7 +94,7 @@ def tell(terminal: Terminal, result: Comparison) -> None:
             "SNR": f"{result.snr_db:.1f} dB",
             "SNR by octave": "  ".join(f"{_hz(f)} {snr:.1f}" for f, snr in result.octave_snr_db.items()) or "–",
             "gain": f"{result.gain_db:+.2f} dB",
-            "delay": f"{result.delay_s * 1e6:+.1f} µs",
+            "delay": f"{round(result.delay_s * 1e6, 1) + 0.0:+.1f} µs",
             "polarity": "the same" if result.polarity > 0 else "[yellow]upside down[/]",
         }
     )

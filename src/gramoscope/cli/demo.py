@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-from cyclopts import Parameter
-
-from gramoscope.cli.terminal import FINE, Terminal
+from gramoscope.cli.terminal import FINE, FINITE, PROCESSORS, Terminal, Workers
 
 
 def demo(
     *,
     out: Path = Path("gramoscope-demo"),
-    seconds: float = 0.1,
-    workers: Annotated[int, Parameter(show_default=False)] = os.cpu_count() or 1,
+    seconds: Annotated[float, FINITE] = 0.1,
+    workers: Workers = PROCESSORS,
     quiet: bool = False,
     json: bool = False,
 ) -> int:
@@ -27,7 +24,7 @@ def demo(
     out
         Folder for everything that is made; an earlier demonstration in it is replaced.
     seconds
-        How much to film; a tenth of a second is 200 groups.
+        How much to film, a hundredth of a second or more; a tenth is 200 groups.
     workers
         Groups at the same time; one for each processor when left out.
     quiet
@@ -38,6 +35,7 @@ def demo(
     from gramoscope.apparatus.capture import open_capture
     from gramoscope.cli import compare as compare_command
     from gramoscope.cli import play as play_command
+    from gramoscope.errors import require
     from gramoscope.listening.compare import compare
     from gramoscope.listening.comparison_figure import comparison_figure
     from gramoscope.listening.ink import save_png
@@ -50,6 +48,9 @@ def demo(
     from gramoscope.simulation.scene import filming_bench, named_scene
 
     terminal = Terminal(quiet, json)
+    require(
+        seconds >= SHORTEST_S, f"{seconds:g} seconds", f"at least {SHORTEST_S:g}, for there to be something to compare"
+    )
     sound, rate_hz = demo_sound(seconds=seconds)
     bench = filming_bench()
     scene = named_scene(replace(bench, sequence=replace(bench.sequence, frames_per_group=DEMO_FRAMES)))
@@ -81,5 +82,6 @@ def demo(
     return FINE
 
 
+SHORTEST_S = 0.01
 DEMO_FRAMES = 4
 """Frames a group: fewer than a rig would take, so that nobody waits."""

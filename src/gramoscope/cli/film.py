@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from cyclopts import Parameter
-
-from gramoscope.cli.terminal import FINE, Terminal
+from gramoscope.cli.terminal import FINE, FINITE, PROCESSORS, Terminal, Workers
 
 if TYPE_CHECKING:
     from gramoscope.conventions import FloatArray
@@ -23,11 +20,11 @@ def film(
     capture: Path,
     /,
     *,
-    start: float = 0.0,
-    seconds: float | None = None,
+    start: Annotated[float, FINITE] = 0.0,
+    seconds: Annotated[float | None, FINITE] = None,
     bench: Path | None = None,
     cut: Literal["lateral", "vertical", "stereo"] | None = None,
-    level_cm_s: float = 3.0,
+    level_cm_s: Annotated[float, FINITE] = 3.0,
     characteristic: str | None = None,
     texture: Literal["powder", "shellac", "polished"] = "powder",
     damage: Literal["none", "light", "heavy"] = "none",
@@ -41,7 +38,7 @@ def film(
     rows: Literal["inward", "outward"] | None = None,
     compress: bool = False,
     overwrite: bool = False,
-    workers: Annotated[int, Parameter(show_default=False)] = os.cpu_count() or 1,
+    workers: Workers = PROCESSORS,
     quiet: bool = False,
     json: bool = False,
 ) -> int:
@@ -62,7 +59,8 @@ def film(
     seconds
         How much to film.
     bench
-        The apparatus, as a file like `capture.toml` (the frames and groups in it are not needed). Options below win.
+        The apparatus, as a file like `capture.toml` or the folder of a capture (the frames and groups in it are not
+        needed). The paper's when left out, with a picture that just holds the groove. Options below win.
     cut
         Direction of the groove's motion.
     level_cm_s
@@ -95,10 +93,17 @@ def film(
         Print what was made as JSON.
     """
     from gramoscope.apparatus.manifest import read_bench
+    from gramoscope.errors import require
     from gramoscope.simulation.film_sound import film_sound
     from gramoscope.simulation.scene import filming_bench, named_scene
 
     terminal = Terminal(quiet, json)
+    require(
+        bench is None or bench.exists(),
+        f"there is no file {bench}",
+        "a bench: a file like capture.toml",
+        "film a moment without --bench, and change the capture.toml that comes out",
+    )
     apparatus = read_bench(bench) if bench is not None else filming_bench()
     disc, sensor, sequence = apparatus.disc, apparatus.sensor, apparatus.sequence
     name = characteristic or disc.characteristic or "flat"
@@ -106,11 +111,12 @@ def film(
     sensor = replace(
         sensor,
         colour=colour or sensor.colour,
-        bits=bits or sensor.bits,
+        bits=sensor.bits if bits is None else bits,
         columns=columns or sensor.columns,
         rows=rows or sensor.rows,
     )
-    sequence = replace(sequence, frames_per_group=frames_per_group or sequence.frames_per_group)
+    if frames_per_group is not None:
+        sequence = replace(sequence, frames_per_group=frames_per_group)
     scene = named_scene(
         replace(apparatus, disc=disc, sensor=sensor, sequence=sequence),
         texture=texture,

@@ -5,6 +5,8 @@ Commands import what they need when they run, so that help comes at once.
 
 from __future__ import annotations
 
+import contextlib
+import os
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
@@ -39,6 +41,7 @@ app = cyclopts.App(
     version=version("gramoscope"),
     suppress_keyboard_interrupt=False,
     result_action="return_value",
+    default_parameter=cyclopts.Parameter(negative=()),
 )
 for command in (demo, film, play, compare, info, recipe):
     app.command(command)
@@ -59,7 +62,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     try:
         result = app(arguments if arguments is None else list(arguments), exit_on_error=False)
+        sys.stdout.flush()
     except cyclopts.CycloptsError:
+        return BAD_INPUT
+    except BrokenPipeError:
+        _write_no_more()
+        return FINE
+    except OSError as error:
+        _write_no_more()
+        show_error(_of_the_system(error))
         return BAD_INPUT
     except GramoscopeError as error:
         show_error(error)
@@ -68,3 +79,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.write("\nStopped. No half-written file was left.\n")
         return INTERRUPTED
     return result if isinstance(result, int) else FINE
+
+
+def _write_no_more() -> None:
+    """Nobody reads standard output any more (`| head`), or it cannot be written: what is left of it goes nowhere."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _of_the_system(error: OSError) -> GramoscopeError:
+    where = f"{error.filename}: " if error.filename else "reading or writing failed: "
+    return GramoscopeError(
+        f"{where}{error.strerror or error}",
+        "files that can be read, and a disk with room",
+        "check the names, the permissions and the room on the disk",
+    )

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import os
+import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-from cyclopts import Parameter
+from gramoscope.cli.terminal import FINE, PROCESSORS, Terminal, Workers, several
 
-from gramoscope.cli.terminal import FINE, Terminal
+SHOWN_GROUPS = 8
 
 
 def play(
@@ -20,7 +20,7 @@ def play(
     recipe: str = "seed-paper",
     rate: int = 96_000,
     characteristic: str | None = None,
-    workers: Annotated[int, Parameter(show_default=False)] = os.cpu_count() or 1,
+    workers: Workers = PROCESSORS,
     quiet: bool = False,
     json: bool = False,
 ) -> int:
@@ -69,14 +69,13 @@ def play(
 
 def tell(terminal: Terminal, report: Mapping[str, Any], out: Path) -> None:
     """Say in a few lines what a transfer is worth and where it lies."""
-    noise, share, groups = report["noise_estimate"], report["share"], report["groups"]
-    level = report["level"]
+    noise, share, level = report["noise_estimate"], report["share"], report["level"]
     rows = {
         "played": f"{report['seconds']:.3f} s in {report['elapsed_s']:.1f} s, recipe {report['recipe'].get('name', '?')}",
-        "groups": f"{groups['read']} read, {groups['lost']} lost; {report['frames_lost']} frames lost",
+        "groups": _groups(report),
         "measured": f"{share['measured']:.1%} of the sound; {share['interpolated']:.1%} interpolated and flagged",
         "level": f"{level['rms_cm_s']:.2f} cm/s rms, {level['peak_cm_s']:.1f} cm/s peak",
-        "noise": f"{noise['sigma_rms_cm_s']:.2f} cm/s rms by the error bars, {noise['signal_to_noise_db']:.1f} dB below",
+        "noise": f"{noise['sigma_rms_cm_s']:.2f} cm/s rms by the error bars, {_below(noise)}",
         "equalised": f"{report['files']['equalised.wav']['characteristic']}",
         "files": "  ".join(str(out / name) for name in ("flat.wav", "equalised.wav", "groove.png", "report.json")),
     }
@@ -88,3 +87,15 @@ def tell(terminal: Terminal, report: Mapping[str, Any], out: Path) -> None:
     more = len(report["problems"]) - 5 + report["problems_not_listed"]
     if more > 0:
         terminal.say(f"[yellow]Found:[/] {more} more problems; they are in report.json")
+
+
+def _groups(report: Mapping[str, Any]) -> str:
+    groups, numbers = report["groups"], report["lost_groups"]
+    shown = ", ".join(str(number) for number in numbers[:SHOWN_GROUPS]) + (", …" if len(numbers) > SHOWN_GROUPS else "")
+    which = f" ({shown})" if numbers else ""
+    return f"{groups['read']} read, {groups['lost']} lost{which}; {several(report['frames_lost'], 'frame')} lost"
+
+
+def _below(noise: Mapping[str, float]) -> str:
+    below_db = noise["signal_to_noise_db"]
+    return f"{below_db:.1f} dB below the sound" if math.isfinite(below_db) else "as strong as the sound"

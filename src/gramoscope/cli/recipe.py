@@ -14,11 +14,12 @@ def recipe(name: str | None = None, /) -> int:
     Parameters
     ----------
     name
-        Recipe to print; all names when left out.
+        Recipe to print, or a file to check and print; all names when left out.
     """
     from gramoscope.player.recipe import load_recipe, recipe_text, shipped_recipes
 
     if name is not None:
+        load_recipe(name)
         print(recipe_text(name), end="")
         return FINE
     Terminal().table({each: load_recipe(each).about for each in shipped_recipes()})

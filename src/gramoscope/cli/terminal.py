@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
+from cyclopts import Parameter
 from rich.console import Console
 from rich.panel import Panel
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -28,6 +31,28 @@ def show_error(error: GramoscopeError) -> None:
     if error.remedy:
         text.append("\n\nTry: ", style="bold").append(error.remedy)
     Console(stderr=True).print(Panel(text, title="Gramoscope cannot do this", title_align="left", border_style="red"))
+
+
+def several(number: int, thing: str) -> str:
+    """Return e.g. "1 frame" or "2 frames"."""
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
+
+
+def _finite(_: object, value: float | tuple[float, ...] | None) -> None:
+    numbers = value if isinstance(value, tuple) else (value,)
+    if any(number is not None and not math.isfinite(number) for number in numbers):
+        raise ValueError("Needed: a finite number.")
+
+
+def _some(_: object, value: int) -> None:
+    if value < 1:
+        raise ValueError("Needed: at least 1.")
+
+
+FINITE = Parameter(validator=_finite)
+"""For every option that is a number of something."""
+Workers = Annotated[int, Parameter(validator=_some, show_default=False)]
+PROCESSORS = os.cpu_count() or 1
 
 
 @dataclass(frozen=True)
@@ -84,4 +109,9 @@ class Terminal:
         )
         with Progress(*columns, console=Console(stderr=True)) as bar:
             task = bar.add_task(title, total=None)
-            yield lambda done, total: bar.update(task, completed=done, total=total)
+            try:
+                yield lambda done, total: bar.update(task, completed=done, total=total)
+            except BaseException:
+                # a bar that stands still has nothing to say beside a message
+                bar.live.transient = True
+                raise
