@@ -24,7 +24,7 @@ from gramoscope.listening.wav import read_sound
 from gramoscope.player.play import Settings, play
 from gramoscope.player.recipe import load_recipe
 from gramoscope.simulation.demo_sound import demo_sound
-from gramoscope.simulation.film_sound import film_sound
+from gramoscope.simulation.film_sound import film_sound, framing_height_px
 from gramoscope.simulation.scene import filming_bench, named_scene
 
 SHARED = Path(__file__).parents[3] / "shared"
@@ -45,12 +45,12 @@ class Case:
     level_m_s: float = 0.03
     frames: int = 12
     radius_m: float = 0.115
-    height_px: int = 512
+    height_px: int = 0
 
 
 CASES = (
     Case("speech", "speech-male.wav", 1.0),
-    Case("speech, full height", "speech-male.wav", 1.0, height_px=1024),
+    Case("speech, 512 rows", "speech-male.wav", 1.0, height_px=512),
     Case("singing", "singing-female.wav", 1.0),
     Case("orchestra", "orchestra.wav", 2.0),
     Case("piano", "piano.wav", 0.5),
@@ -74,10 +74,12 @@ def film_case(case: Case, folder: Path, seconds: float) -> None:
     else:
         sound, rate_hz = read_sound(SHARED / "data" / "audio" / case.sound, start_s=case.start_s, seconds=seconds)
         samples = one_channel(sound)
-    bench = filming_bench(height_px=case.height_px)
+    disc = replace(filming_bench().disc, cut=case.cut)
+    height_px = case.height_px or framing_height_px(samples, rate_hz, level_m_s=case.level_m_s, disc=disc)
+    bench = filming_bench(height_px=height_px)
     bench = replace(
         bench,
-        disc=replace(bench.disc, cut=case.cut),
+        disc=disc,
         rotation=replace(bench.rotation, radius_m=case.radius_m),
         sequence=replace(bench.sequence, frames_per_group=case.frames),
     )

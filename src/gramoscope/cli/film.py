@@ -31,6 +31,7 @@ def film(
     imperfections: Literal["none", "modest", "rough"] = "none",
     seed: int = 0,
     frames_per_group: int | None = None,
+    height: int | None = None,
     layout: Literal["tiff", "png", "zarr", "video"] = "tiff",
     colour: Literal["mono", "rgb"] | None = None,
     bits: int | None = None,
@@ -77,6 +78,8 @@ def film(
         Another number makes another record of the same sound.
     frames_per_group
         12 when left out.
+    height
+        Rows of the picture; as many as the groove's swing needs, 512 … 1024, when left out. A --bench has its own.
     layout
         A TIFF a group, a PNG a frame, one Zarr array, or a lossless video.
     colour, bits, columns, rows
@@ -94,7 +97,7 @@ def film(
     """
     from gramoscope.apparatus.manifest import read_bench
     from gramoscope.errors import require
-    from gramoscope.simulation.film_sound import film_sound
+    from gramoscope.simulation.film_sound import film_sound, framing_height_px
     from gramoscope.simulation.scene import filming_bench, named_scene
 
     terminal = Terminal(quiet, json)
@@ -104,8 +107,13 @@ def film(
         "a bench: a file like capture.toml",
         "film a moment without --bench, and change the capture.toml that comes out",
     )
-    apparatus = read_bench(bench) if bench is not None else filming_bench()
-    disc, sensor, sequence = apparatus.disc, apparatus.sensor, apparatus.sequence
+    given = read_bench(bench) if bench is not None else filming_bench()
+    samples, rate_hz = _sound(terminal, sound, start, seconds, stereo=(cut or given.disc.cut) == "stereo")
+    if bench is None:
+        disc = replace(given.disc, cut=cut or given.disc.cut, characteristic=characteristic)
+        needed = framing_height_px(samples, rate_hz, level_m_s=level_cm_s / 100, disc=disc)
+        given = filming_bench(height_px=needed if height is None else height)
+    disc, sensor, sequence = given.disc, given.sensor, given.sequence
     name = characteristic or disc.characteristic or "flat"
     disc = replace(disc, cut=cut or disc.cut, characteristic=name)
     sensor = replace(
@@ -118,14 +126,13 @@ def film(
     if frames_per_group is not None:
         sequence = replace(sequence, frames_per_group=frames_per_group)
     scene = named_scene(
-        replace(apparatus, disc=disc, sensor=sensor, sequence=sequence),
+        replace(given, disc=disc, sensor=sensor, sequence=sequence),
         texture=texture,
         damage=damage,
         imperfections=imperfections,
         seed=seed,
     )
     scene = replace(scene, level_m_s=level_cm_s / 100)
-    samples, rate_hz = _sound(terminal, sound, start, seconds, stereo=disc.cut == "stereo")
     with terminal.progress("Filming") as progress:
         film_sound(
             samples,
