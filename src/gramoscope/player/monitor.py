@@ -33,17 +33,23 @@ class Overview:
         n = self.samples_per_point
         whole = columns.shape[1] // n * n
         runs = columns[:, :whole].reshape(3, -1, n)
-        self.points.append(np.array([runs[0].min(axis=1), runs[0].max(axis=1), *runs[1:].max(axis=2)]))
+        self.points.append(_extremes(runs))
         self._rest = columns[:, whole:]
 
     def waveform(self, rate_hz: float) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
         """Return time, velocity, sigma and interpolated, at even steps: the samples themselves, or low and high in turn."""
-        low, high, sigma, missing = np.asarray(np.concatenate([np.empty((4, 0)), *self.points], axis=1), np.float64)
+        rest = [_extremes(self._rest[:, np.newaxis, :])] if self._rest.size else []
+        low, high, sigma, missing = np.concatenate([np.empty((4, 0)), *self.points, *rest], axis=1)
         if self.samples_per_point == 1:
             return np.arange(low.size) / rate_hz, low, sigma, missing > 0
         velocity = np.column_stack([low, high]).ravel()
         time: FloatArray = np.arange(velocity.size, dtype=np.float64) * (self.samples_per_point / 2 / rate_hz)
         return time, velocity, np.repeat(sigma, 2), np.repeat(missing > 0, 2)
+
+
+def _extremes(runs: FloatArray) -> FloatArray:
+    """Of velocity, sigma and missing, shape (3, run, sample): lowest and highest velocity, largest of the others."""
+    return np.array([runs[0].min(axis=1), runs[0].max(axis=1), *runs[1:].max(axis=2)])
 
 
 @dataclass

@@ -18,7 +18,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from gramoscope.apparatus.bench import Bench
 from gramoscope.camera.exposure import Exposure
-from gramoscope.errors import ArgumentError
+from gramoscope.errors import ArgumentError, require
 from gramoscope.pickup.flow.horn_schunck import FlowMethod, GrooveHornSchunck, HornSchunck
 from gramoscope.pickup.in_focus import InFocus
 from gramoscope.pickup.seed_paper import HoughSearch, SeedPaperPickup
@@ -198,10 +198,16 @@ def _checked(hint: Any, value: Any, where: str) -> Any:
     # TOML has no tuples, and pydantic's strictness (no "0.5" for 0.5, no true for 1) wants them
     given = tuple(value) if isinstance(value, list) else value
     try:
-        return TypeAdapter(hint, config=ConfigDict(allow_inf_nan=False, strict=True)).validate_python(given)
+        checked = TypeAdapter(hint, config=ConfigDict(allow_inf_nan=False, strict=True)).validate_python(given)
     except ValidationError as error:
         needed = _IN_WORDS.get(hint, error.errors()[0]["msg"].lower())
         raise ArgumentError(f"{where} = {value!r}", needed) from error
+    # all parameters are sizes, shares and counts: what a part does not check itself is at least not negative
+    numbers = [
+        number for number in (given if isinstance(given, tuple) else (given,)) if isinstance(number, int | float)
+    ]
+    require(all(number >= 0 for number in numbers), f"{where} = {value!r}", "zero or more")
+    return checked
 
 
 _IN_WORDS: dict[Any, str] = {
