@@ -11,13 +11,15 @@ from typing import Any
 import numpy as np
 import pytest
 import soundfile
+from matplotlib.figure import Figure
 
 from gramoscope.apparatus.bench import Sequence
-from gramoscope.apparatus.capture import open_capture
+from gramoscope.apparatus.capture import Capture, open_capture
 from gramoscope.apparatus.capture_writer import CaptureWriter
-from gramoscope.conventions import FloatArray
-from gramoscope.player.play import Settings, play
-from gramoscope.player.recipe import load_recipe
+from gramoscope.conventions import BoolArray, FloatArray
+from gramoscope.player import play as play_module
+from gramoscope.player.monitor import Monitor
+from gramoscope.player.recipe import Recipe, load_recipe
 from gramoscope.signal_path import ImageArray
 from gramoscope.simulation.passage import Passage
 from gramoscope.simulation.render import cut_passage, render_group
@@ -57,10 +59,16 @@ class Played:
 
     folder: Path
     report: dict[str, Any]
+    monitor: Monitor
 
     def __getitem__(self, name: str) -> FloatArray:
         samples, _ = soundfile.read(self.folder / name)
         return samples
+
+    def measured(self) -> BoolArray:
+        """Which samples of a passage short enough to be drawn sample by sample were measured."""
+        assert self.monitor.overview.samples_per_point == 1
+        return ~self.monitor.overview.waveform(self.report["rate_hz"])[3]
 
     def bits(self, name: str) -> bytes:
         return (self.folder / name).read_bytes()
@@ -68,8 +76,17 @@ class Played:
 
 def play_capture(capture: Path, out: Path, *, recipe: str = "seed-paper", **settings: Any) -> Played:
     """Play a capture; the report is read from the file, not from memory."""
-    play(open_capture(capture), load_recipe(recipe), out, Settings(**settings))
-    return Played(out, json.loads((out / "report.json").read_text(encoding="utf-8")))
+    monitors: list[Monitor] = []
+    draw = play_module.groove_picture
+
+    def overhear(capture: Capture, recipe: Recipe, monitor: Monitor, rate_hz: float) -> Figure:
+        monitors.append(monitor)
+        return draw(capture, recipe, monitor, rate_hz)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(play_module, "groove_picture", overhear)
+        play_module.play(open_capture(capture), load_recipe(recipe), out, play_module.Settings(**settings))
+    return Played(out, json.loads((out / "report.json").read_text(encoding="utf-8")), monitors[0])
 
 
 @pytest.fixture(scope="session")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -27,8 +28,7 @@ def _audio(size: int, seed: int = 3) -> Audio:
 def _pieces(audio: Audio, cuts: list[int]) -> list[Audio]:
     edges = [0, *sorted(min(cut, audio.samples.size) for cut in cuts), audio.samples.size]
     return [
-        Audio(a, RATE_HZ, audio.samples[a:b], audio.sigma[a:b], audio.flags[a:b])
-        for a, b in zip(edges[:-1], edges[1:], strict=True)
+        Audio(a, RATE_HZ, audio.samples[a:b], audio.sigma[a:b], audio.flags[a:b]) for a, b in itertools.pairwise(edges)
     ]
 
 
@@ -142,7 +142,7 @@ def test_problems_are_told_up_to_a_number_and_counted_beyond_it() -> None:
         monitor.picked_up(_trace(number, seen=True, problems=(f"a {number}", f"b {number}")), frames_lost=0)
     found = monitor.as_dict()
     assert len(found["problems"]) == MOST_PROBLEMS
-    assert found["problems"][:3] == ["a 0", "b 0", "a 1"]
+    assert found["problems"][:3] == ["group 0, a 0", "group 0, b 0", "group 1, a 1"]
     assert found["problems_not_listed"] == 6
 
 

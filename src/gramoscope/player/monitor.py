@@ -88,7 +88,8 @@ class Monitor:
         if not read.any():
             self.groups_lost.append(trace.number)
         self.problems_count += len(trace.problems)
-        self.problems += trace.problems[: max(MOST_PROBLEMS - len(self.problems), 0)]
+        room = max(MOST_PROBLEMS - len(self.problems), 0)
+        self.problems += [_with_group(problem, trace.number) for problem in trace.problems[:room]]
         walls = np.isfinite(trace.slope).any(axis=1)
         if walls.any():
             flags = trace.flags[walls]
@@ -180,6 +181,10 @@ class Monitor:
             "problems": self.problems,
             "problems_not_listed": self.problems_count - len(self.problems),
         }
+
+
+def _with_group(problem: str, number: int) -> str:
+    return problem if problem.startswith(f"group {number}") else f"group {number}, {problem}"
 
 
 _FLAG_NAMES = tuple(str(flag.name).lower() for flag in Quality)
