@@ -75,6 +75,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except GramoscopeError as error:
         show_error(error)
         return BAD_INPUT
+    except MemoryError:
+        show_error(
+            GramoscopeError("there is not enough memory", "less at a time", "fewer --workers, or a lower --rate")
+        )
+        return BAD_INPUT
     except KeyboardInterrupt:
         sys.stderr.write("\nStopped. No half-written file was left.\n")
         return INTERRUPTED
