@@ -107,6 +107,9 @@ def film(
         "a bench: a file like capture.toml",
         "film a moment without --bench, and change the capture.toml that comes out",
     )
+    require(
+        bench is None or height is None, "--height beside --bench", "one of the two", "write height_px into the bench"
+    )
     given = read_bench(bench) if bench is not None else filming_bench()
     samples, rate_hz = _sound(terminal, sound, start, seconds, stereo=(cut or given.disc.cut) == "stereo")
     if bench is None:
