@@ -108,7 +108,13 @@ def _windowed(votes: IntArray, window_px: int) -> FloatArray:
 
 
 def peaks(
-    accumulator: Accumulator, *, count: int, separation_px: float, window_px: int = 7, least_share: float = 0.2
+    accumulator: Accumulator,
+    *,
+    count: int,
+    separation_px: float,
+    window_px: int = 7,
+    least_share: float = 0.2,
+    least_votes: float = 0.0,
 ) -> list[Line]:
     """Return the strongest lines, strongest first.
 
@@ -123,6 +129,8 @@ def peaks(
         Votes are counted over a window of ρ this wide (odd): a stripe is not one pixel thin.
     least_share : float
         A line with fewer votes than this share of the strongest is no peak.
+    least_votes : float
+        Nor is one with fewer votes than this.
 
     Returns
     -------
@@ -133,7 +141,7 @@ def peaks(
     row = accumulator.rho_px[None, :] / np.cos(accumulator.theta_rad)[:, None]
     found: list[Line] = []
     best = score.max(initial=0.0)
-    while len(found) < count and score.max(initial=0.0) > max(least_share * best, 0.0):
+    while len(found) < count and score.max(initial=0.0) > max(least_share * best, least_votes):
         i, j = np.unravel_index(int(np.argmax(score)), score.shape)
         found.append(
             Line(

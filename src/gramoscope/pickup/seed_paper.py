@@ -51,6 +51,9 @@ class HoughSearch:
         Half size of the box about a peak: a point belongs to the peak when a line through it does.
     separation_px : float
         Least distance between two peaks, about half the least distance of two stripes.
+    least_votes_share : float
+        A peak needs this many points for each column of its segment: where no stripe is sharp, the least blurred dirt would
+        else be taken for one.
     segments : int
         Into how many stretches of columns the picture is cut; 1 in the paper.
     """
@@ -60,6 +63,7 @@ class HoughSearch:
     region_theta_deg: float = 1.5
     region_rho_px: float = 9.0
     separation_px: float = 30.0
+    least_votes_share: float = 0.3
     segments: int = 4
 
     def __post_init__(self) -> None:
@@ -259,10 +263,19 @@ class SeedPaperPickup:
                 column_origin=(start + stop - 1) / 2,
                 theta_rad=self.hough.theta_rad,
             )
-            lines = peaks(votes, count=CANDIDATE_LINES, separation_px=self.hough.separation_px)
+            lines = peaks(
+                votes,
+                count=CANDIDATE_LINES,
+                separation_px=self.hough.separation_px,
+                least_votes=self.hough.least_votes_share * float(stop - start),
+            )
             edge_row = self.bench.glass_edge_row if glass else None
             glass_low = glass is not None and glass.side == "low"
-            assignments.append(self.stripe_model.assignments(lines, stripes, edge_row=edge_row, glass_low=glass_low))
+            assignments.append(
+                self.stripe_model.assignments(
+                    lines, stripes, edge_row=edge_row, glass_low=glass_low, walls_part=self.bench.disc.cut != "lateral"
+                )
+            )
             accumulators.append(votes)
             candidates.append(lines)
         path = self.stripe_model.path(assignments, [float(b) for b in borders[1:-1]], stripes)

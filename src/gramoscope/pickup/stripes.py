@@ -135,7 +135,13 @@ class StripeModel:
     largest_jump_px: float = 20.0
 
     def assignments(
-        self, lines: Sequence[Line], stripes: Sequence[Stripe], *, edge_row: float | None, glass_low: bool
+        self,
+        lines: Sequence[Line],
+        stripes: Sequence[Stripe],
+        *,
+        edge_row: float | None,
+        glass_low: bool,
+        walls_part: bool = False,
     ) -> list[Assignment]:
         """Return the ways in which the lines of one segment can be the expected stripes.
 
@@ -149,6 +155,9 @@ class StripeModel:
             Row of the glass edge, None without a glass.
         glass_low : bool
             Whether the glass covers the rows below its edge.
+        walls_part : bool
+            Whether the cut moves the walls apart (vertical, stereo): then the stripes of opposite walls may have any
+            distance and any slopes, as long as their order holds.
 
         Returns
         -------
@@ -158,7 +167,7 @@ class StripeModel:
         ordered = sorted(lines, key=lambda line: line.row_at(line.column_origin))
         found = []
         for chosen, roles in _combinations(ordered, len(stripes)):
-            score = self._score(chosen, [stripes[role] for role in roles], edge_row, glass_low)
+            score = self._score(chosen, [stripes[role] for role in roles], edge_row, glass_low, walls_part)
             if score > 0:
                 places: list[Line | None] = [None] * len(stripes)
                 for line, role in zip(chosen, roles, strict=True):
@@ -215,11 +224,18 @@ class StripeModel:
         return [int(i) for i in scores.argmax(axis=0)]
 
     def _score(
-        self, lines: Sequence[Line], stripes: Sequence[Stripe], edge_row: float | None, glass_low: bool
+        self,
+        lines: Sequence[Line],
+        stripes: Sequence[Stripe],
+        edge_row: float | None,
+        glass_low: bool,
+        walls_part: bool,
     ) -> float:
         rows = [float(line.row_at(line.column_origin)) for line in lines]
         fit = self.lone_stripe if len(lines) == 1 else 1.0
         for i, j in combinations(range(len(lines)), 2):
+            if walls_part and stripes[i].wall != stripes[j].wall:
+                continue
             fit *= self._pair_fit(rows[j] - rows[i], lines[i], lines[j], stripes[i], stripes[j])
         votes = 0.0
         for row, line, stripe in zip(rows, lines, stripes, strict=True):
