@@ -39,7 +39,7 @@ def test_where_too_few_columns_were_measured_the_line_stands_in_and_says_so() ->
     gap = slice(10, 12)
     np.testing.assert_array_equal(samples.flags[gap], Quality.SPARSE | Quality.INTERPOLATED)
     np.testing.assert_array_equal(samples.slope[gap], 0.05)
-    np.testing.assert_array_equal(samples.slope_sigma[gap], UNSEEN_SLOPE_SIGMA)
+    np.testing.assert_allclose(samples.slope_sigma[gap], np.hypot(UNSEEN_SLOPE_SIGMA, 0.05))
     assert not samples.flags[[0, 5, -1]].any()
 
 

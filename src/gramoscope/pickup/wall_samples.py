@@ -18,8 +18,9 @@ from gramoscope.pickup.wall import Planes, correlation_length_px
 from gramoscope.quality import FlagArray, Quality, no_flags
 
 UNSEEN_SLOPE_SIGMA = 0.05
-"""Standard error given to the slope of a Hough line where no orientation could be measured; 0.05 is 4.7 cm/s at 78 rpm
-and 115 mm, of the order of the music itself. A guess."""
+"""Least standard error given to the slope of a Hough line where no orientation could be measured; 0.05 is 4.7 cm/s at
+78 rpm and 115 mm, of the order of the music itself. A steep line is more likely to be a false one, so its slope is added in
+quadrature: it then weighs next to nothing. A guess."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +87,7 @@ def samples_of_wall(
     correlation = correlation_length_px(residuals(planes, rows, measured, stations))
     slope = np.where(seen, planes.slope, line_slope)
     lucky = np.maximum(np.nanmedian(planes.scatter_px) / planes.scatter_px, 1.0) if seen.any() else 1.0
-    sigma = np.where(seen, planes.slope_sigma * lucky * np.sqrt(correlation), UNSEEN_SLOPE_SIGMA)
+    sigma = np.where(seen, planes.slope_sigma * lucky * np.sqrt(correlation), np.hypot(UNSEEN_SLOPE_SIGMA, slope))
     flags = no_flags(stations.size)
     flags[~seen] |= np.uint16(Quality.SPARSE | Quality.INTERPOLATED)
     nothing = ~np.isfinite(slope)
