@@ -31,7 +31,7 @@ class Quality(IntFlag):
 
 _MEANINGS: dict[Quality, str] = {
     Quality.INTERPOLATED: "no measurement here: the value was filled in from its surroundings",
-    Quality.FRAME_LOST: "every frame of this stretch is missing, truncated or of the wrong size",
+    Quality.FRAME_LOST: "frames of this stretch are missing, truncated or of the wrong size",
     Quality.DARK: "the frames show no light or no contrast",
     Quality.SATURATED: "so many pixels are at full scale that the texture is lost",
     Quality.NO_STRIPE: "the sharp stripes that belong here were not found",

@@ -2,102 +2,35 @@
 
 Sections 5 and 6 of B. Tian and J. L. Barron, *Sound from gramophone record groove surface orientation*. Where the paper
 is silent the choices are ours and say so where they stand: `flow.horn_schunck` (the constraint), `wall` (the robust
-estimator), `stripes` (which peak is which stripe), and one departure: the Hough transform may work on several *segments*
-of the stretch, because in loud passages a stripe is no longer one straight line across the picture. With one segment it
-is the paper's.
+estimator), `stripes` (which peak is which stripe), and one departure: the Hough transform may work on several segments of
+the picture (`search`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 
 import numpy as np
 
 from gramoscope.apparatus.bench import Bench
 from gramoscope.camera.exposure import Exposure
-from gramoscope.conventions import FloatArray, IntArray, lateral_of_row_m, rad
-from gramoscope.errors import require
+from gramoscope.conventions import FloatArray, IntArray, lateral_of_row_m
 from gramoscope.pickup.centreline import Centreline, centroids, discard_damaged_columns, fill_voids
 from gramoscope.pickup.flow.derivatives import Derivatives, group_derivatives, texture_contrast
 from gramoscope.pickup.flow.horn_schunck import Flow, FlowMethod, GrooveHornSchunck
-from gramoscope.pickup.hough import Accumulator, Line, accumulate, peaks, segment
 from gramoscope.pickup.in_focus import InFocus
 from gramoscope.pickup.registration import Canvas, frame_shifts, register
+from gramoscope.pickup.search import HoughSearch, Segment, line_rows, line_slopes
 from gramoscope.pickup.stripes import Stripe, StripeModel, expected_stripes, kept_stripes
 from gramoscope.pickup.wall import Planes, WallOrientation, wall_angle_rad
 from gramoscope.pickup.wall_samples import WallSamples, samples_of_wall
 from gramoscope.quality import Quality, no_flags
 from gramoscope.signal_path import FrameGroup, Texture, WallTrace
 
-CANDIDATE_LINES = 6
 NEARLY_WHITE = 0.97
 """Points brighter than this share of full scale are burnt out: their texture is the camera's."""
 TEXTURE_REACH_PX = 40
 """How far, beyond the nominal overlap, the strips reach that neighbouring stretches are matched by."""
-
-
-@dataclass(frozen=True)
-class HoughSearch:
-    """The Hough transform and the regions of its peaks.
-
-    Parameters
-    ----------
-    theta_reach_deg : float
-        Largest |θ| tried; 45 in the paper.
-    theta_step_deg : float
-        1 in the paper.
-    region_theta_deg, region_rho_px : float
-        Half size of the box about a peak: a point belongs to the peak when a line through it does.
-    separation_px : float
-        Least distance between two peaks, about half the least distance of two stripes.
-    least_votes_share : float
-        A peak needs this many points for each column of its segment: where no stripe is sharp, the least blurred dirt would
-        else be taken for one.
-    segments : int
-        Into how many stretches of columns the picture is cut; 1 in the paper.
-    """
-
-    theta_reach_deg: float = 45.0
-    theta_step_deg: float = 1.0
-    region_theta_deg: float = 1.5
-    region_rho_px: float = 9.0
-    separation_px: float = 30.0
-    least_votes_share: float = 0.3
-    segments: int = 4
-
-    def __post_init__(self) -> None:
-        require(0 < self.theta_reach_deg <= 80, f"theta reaches to {self.theta_reach_deg}°", "above 0, at most 80")
-        require(0 < self.theta_step_deg <= 10, f"theta steps of {self.theta_step_deg}°", "above 0, at most 10")
-        require(self.segments >= 1, f"{self.segments} segments", "at least one")
-
-    @property
-    def theta_rad(self) -> FloatArray:
-        """The angles tried."""
-        steps = round(self.theta_reach_deg / self.theta_step_deg)
-        return np.asarray(np.deg2rad(np.arange(-steps, steps + 1) * self.theta_step_deg), np.float64)
-
-
-@dataclass(frozen=True, eq=False)
-class SegmentReading:
-    """What the Hough transform found in one segment.
-
-    Attributes
-    ----------
-    start, stop : int
-        Its columns.
-    accumulator : Accumulator
-    candidates : list of Line
-        Peaks, strongest first.
-    lines : list of Line or None
-        The line of each expected stripe.
-    """
-
-    start: int
-    stop: int
-    accumulator: Accumulator
-    candidates: list[Line]
-    lines: list[Line | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +51,7 @@ class Reading:
         In-focus points.
     label : int array, shape (point,)
         Number of the stripe; −1 in no region, −2 disputed, −3 in a damaged column.
-    segments : list of SegmentReading
+    segments : list of Segment
     stripes : tuple of Stripe
         As expected from the bench.
     centrelines : list of Centreline
@@ -137,7 +70,7 @@ class Reading:
     point_row: IntArray
     point_column: IntArray
     label: IntArray
-    segments: list[SegmentReading]
+    segments: list[Segment]
     stripes: tuple[Stripe, ...]
     centrelines: list[Centreline]
     kept: tuple[int, ...]
@@ -205,14 +138,17 @@ class SeedPaperPickup:
         in_focus = self.in_focus.mask(derivatives, flow) & (canvas.mean < NEARLY_WHITE * group.white_level)
         rows, columns = np.nonzero(in_focus)
         stripes = expected_stripes(self.bench)
-        segments = self._find_lines(rows, columns, stripes, canvas.mean.shape)
-        label = self._label(rows, columns, segments)
+        segments = self.hough.find(
+            rows, columns, canvas.mean.shape, stripes=stripes, stripe_model=self.stripe_model, bench=self.bench
+        )
+        label = self.hough.label(rows, columns, segments)
         label = discard_damaged_columns(label, columns, width=canvas.mean.shape[1])
         weights = derivatives.x[rows, columns].astype(np.float64) ** 2
-        lines = [
-            self._centreline(number, rows, columns, weights, label, segments, canvas.mean.shape[1])
-            for number in range(len(stripes))
-        ]
+        lines = []
+        for number in range(len(stripes)):
+            mine = label == number
+            row, _ = centroids(rows[mine], columns[mine], weights[mine], width=canvas.mean.shape[1])
+            lines.append(fill_voids(row, line_rows(segments, number)))
         kept = kept_stripes(stripes)
         planes, samples = self._orient(stripes, lines, segments)
         head, tail = self._textures(group, canvas, derivatives)
@@ -248,80 +184,8 @@ class SeedPaperPickup:
         rise = np.sign(lateral) * np.tan(bench.disc.wall_angle_rad) * on_wall
         return np.asarray(step_m * rise / bench.objective.object_distance_m)
 
-    def _find_lines(
-        self, rows: IntArray, columns: IntArray, stripes: tuple[Stripe, ...], shape: tuple[int, ...]
-    ) -> list[SegmentReading]:
-        borders = np.linspace(0, shape[1], self.hough.segments + 1).astype(int)
-        glass = self.bench.cover_glass
-        accumulators, candidates, assignments = [], [], []
-        for start, stop in pairwise(borders):
-            inside = (columns >= start) & (columns < stop)
-            votes = accumulate(
-                rows[inside],
-                columns[inside],
-                row_origin=(shape[0] - 1) / 2,
-                column_origin=(start + stop - 1) / 2,
-                theta_rad=self.hough.theta_rad,
-            )
-            lines = peaks(
-                votes,
-                count=CANDIDATE_LINES,
-                separation_px=self.hough.separation_px,
-                least_votes=self.hough.least_votes_share * float(stop - start),
-            )
-            edge_row = self.bench.glass_edge_row if glass else None
-            glass_low = glass is not None and glass.side == "low"
-            assignments.append(
-                self.stripe_model.assignments(
-                    lines, stripes, edge_row=edge_row, glass_low=glass_low, walls_part=self.bench.disc.cut != "lateral"
-                )
-            )
-            accumulators.append(votes)
-            candidates.append(lines)
-        path = self.stripe_model.path(assignments, [float(b) for b in borders[1:-1]], stripes)
-        return [
-            SegmentReading(int(start), int(stop), votes, lines, list(chosen.lines))
-            for start, stop, votes, lines, chosen in zip(
-                borders[:-1], borders[1:], accumulators, candidates, path, strict=True
-            )
-        ]
-
-    def _label(self, rows: IntArray, columns: IntArray, segments: list[SegmentReading]) -> IntArray:
-        label = np.full(rows.size, -1, np.int64)
-        for part in segments:
-            inside = np.flatnonzero((columns >= part.start) & (columns < part.stop))
-            numbers = [i for i, line in enumerate(part.lines) if line is not None]
-            local = segment(
-                rows[inside],
-                columns[inside],
-                [line for line in part.lines if line is not None],
-                theta_reach_rad=rad(self.hough.region_theta_deg),
-                rho_reach_px=self.hough.region_rho_px,
-            )
-            label[inside] = np.array([*numbers, -2, -1])[local] if numbers else -1
-        return label
-
-    def _centreline(
-        self,
-        number: int,
-        rows: IntArray,
-        columns: IntArray,
-        weights: FloatArray,
-        label: IntArray,
-        segments: list[SegmentReading],
-        width: int,
-    ) -> Centreline:
-        mine = label == number
-        row, _ = centroids(rows[mine], columns[mine], weights[mine], width=width)
-        line_row = np.full(width, np.nan)
-        for part in segments:
-            line = part.lines[number]
-            if line is not None:
-                line_row[part.start : part.stop] = line.row_at(np.arange(part.start, part.stop))
-        return fill_voids(row, line_row)
-
     def _orient(
-        self, stripes: tuple[Stripe, ...], lines: list[Centreline], segments: list[SegmentReading]
+        self, stripes: tuple[Stripe, ...], lines: list[Centreline], segments: list[Segment]
     ) -> tuple[Planes, dict[int, WallSamples]]:
         """Planes and samples of each wall that the kept stripes make; the planes are those of the last wall."""
         stations = self.orientation.stations(lines[0].row.size)
@@ -336,7 +200,7 @@ class SeedPaperPickup:
                 rows,
                 measured,
                 stations,
-                line_slope=_line_slope(segments, mine, stations),
+                line_slope=line_slopes(segments, mine, stations),
                 expected_row=np.array([stripes[i].row for i in mine]),
             )
             angle = wall_angle_rad(
@@ -415,13 +279,3 @@ class SeedPaperPickup:
             flags=no_flags(2, stations) | np.uint16(flags | Quality.INTERPOLATED),
             problems=group.problems,
         )
-
-
-def _line_slope(segments: list[SegmentReading], stripes: list[int], stations: FloatArray) -> FloatArray:
-    """Mean slope of the Hough lines of some stripes at each station; NaN where none was found."""
-    slope = np.full(stations.size, np.nan)
-    for part in segments:
-        found = [line.slope for i in stripes if (line := part.lines[i]) is not None]
-        if found:
-            slope[(stations >= part.start) & (stations < part.stop)] = np.mean(found)
-    return slope

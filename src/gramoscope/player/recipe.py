@@ -21,7 +21,8 @@ from gramoscope.camera.exposure import Exposure
 from gramoscope.errors import ArgumentError, require
 from gramoscope.pickup.flow.horn_schunck import FlowMethod, GrooveHornSchunck, HornSchunck
 from gramoscope.pickup.in_focus import InFocus
-from gramoscope.pickup.seed_paper import HoughSearch, SeedPaperPickup
+from gramoscope.pickup.search import HoughSearch
+from gramoscope.pickup.seed_paper import SeedPaperPickup
 from gramoscope.pickup.stripes import StripeModel
 from gramoscope.pickup.wall import WallOrientation
 from gramoscope.preamp.resample import DEFAULT_PASSBAND
