@@ -82,8 +82,14 @@ def film(
         Rows of the picture; as many as the groove's swing needs, 512 … 1024, when left out. A --bench has its own.
     layout
         A TIFF a group, a PNG a frame, one Zarr array, or a lossless video.
-    colour, bits, columns, rows
-        Of the camera, and which way round it looks.
+    colour
+        Of the camera.
+    bits
+        Of the camera, 8 … 16.
+    columns
+        Whether the groove runs forward or backward along a row of pixels.
+    rows
+        Whether rows count inward or outward on the disc.
     compress
         Smaller files, slower to read.
     overwrite

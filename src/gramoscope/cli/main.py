@@ -81,6 +81,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
         return BAD_INPUT
     except KeyboardInterrupt:
+        if arguments is None:
+            # libraries that were stopped half-way complain while the interpreter tidies up: nobody can use that
+            sys.unraisablehook = lambda _: None
         sys.stderr.write("\nStopped. No half-written file was left.\n")
         return INTERRUPTED
     return result if isinstance(result, int) else FINE

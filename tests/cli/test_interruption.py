@@ -1,0 +1,117 @@
+"""Ctrl-C ends a command at any moment without a trace; a killed one leaves nothing that looks whole and is not."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import soundfile
+
+COMMAND = [sys.executable, "-c", "import sys; from gramoscope.cli.main import main; sys.exit(main())"]
+PATIENCE_S = 60.0
+
+
+def _signalled(
+    folder: Path, sign: str, number: int, *arguments: Any, more: int = 1, wait_s: float = 0.0
+) -> tuple[int, str]:
+    """Start a command, send a signal once `more` paths like `sign` are there, return how it ended and what it said."""
+    command = [*COMMAND, *(str(argument) for argument in arguments)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+        deadline = time.monotonic() + PATIENCE_S
+        while len(list(folder.glob(sign))) < more and process.poll() is None and time.monotonic() < deadline:
+            time.sleep(0.002)
+        time.sleep(wait_s)
+        process.send_signal(number)
+        said, _ = process.communicate(timeout=PATIENCE_S)
+    return process.returncode, said
+
+
+def _names(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+@pytest.fixture
+def long_film(tone: Path) -> tuple[Any, ...]:
+    """Arguments for some seconds of work."""
+    return (tone, "--start", 0.03, "--seconds", 0.06, "--frames-per-group", 6)
+
+
+@pytest.fixture(scope="session")
+def longer_capture(here: Path, tone: Path, bench: Path) -> Path:
+    """Twenty groups: a second or two of playing."""
+    from gramoscope.cli.main import main
+
+    command = ["film", tone, here / "longer", "--bench", bench, "--seconds", 0.01, "--quiet"]
+    assert main([str(part) for part in command]) == 0
+    return here / "longer"
+
+
+MOMENTS = [("out/.flat.wav.*.part", 0.0), ("out/.flat.wav.*.part", 0.4), ("out/.report.json.*.part", 0.0)]
+
+
+@pytest.mark.parametrize(("sign", "wait_s"), MOMENTS, ids=["at once", "while reading", "while drawing"])
+def test_playing_stopped_by_ctrl_c_leaves_nothing(
+    longer_capture: Path, tmp_path: Path, sign: str, wait_s: float
+) -> None:
+    play = ("play", longer_capture, "--out", tmp_path / "out")
+    code, said = _signalled(tmp_path, sign, signal.SIGINT, *play, wait_s=wait_s)
+    assert code == 130, said
+    assert "Traceback" not in said
+    assert "Stopped." in said
+    assert _names(tmp_path) == set()
+
+
+def test_playing_stopped_by_ctrl_c_leaves_an_earlier_transfer_as_it_was(
+    gramoscope: Callable[..., Any], capture: Path, longer_capture: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    assert gramoscope("play", capture, "--out", out, "--quiet").code == 0
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    code, said = _signalled(out, ".report.json.*.part", signal.SIGINT, "play", longer_capture, "--out", out)
+    assert code == 130, said
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+
+
+@pytest.mark.parametrize(("layout", "more"), [("tiff", 1), ("tiff", 7), ("zarr", 1)])
+def test_filming_stopped_by_ctrl_c_leaves_nothing(
+    long_film: tuple[Any, ...], tmp_path: Path, layout: str, more: int
+) -> None:
+    film = ("film", long_film[0], tmp_path / "c", *long_film[1:], "--layout", layout)
+    sign = ".c.*.partial/frames/*" if layout == "tiff" else ".c.*.partial"
+    code, said = _signalled(tmp_path, sign, signal.SIGINT, *film, more=more)
+    assert code == 130, said
+    assert "Traceback" not in said
+    assert _names(tmp_path) == set()
+
+
+@pytest.mark.parametrize("sign", ["out/.flat.wav.*.part", "out/.report.json.*.part"])
+def test_playing_killed_leaves_only_hidden_files_and_can_be_repeated(
+    gramoscope: Callable[..., Any], longer_capture: Path, tmp_path: Path, sign: str
+) -> None:
+    out = tmp_path / "out"
+    code, _ = _signalled(tmp_path, sign, signal.SIGKILL, "play", longer_capture, "--out", out)
+    assert code == -signal.SIGKILL
+    assert all(name.startswith(".") for name in _names(out))
+    assert gramoscope("play", longer_capture, "--out", out, "--quiet").code == 0
+    report = json.loads((out / "report.json").read_text(encoding="utf-8"))
+    for name in ("flat.wav", "equalised.wav"):
+        assert soundfile.info(out / name).duration == pytest.approx(report["seconds"])
+
+
+def test_filming_killed_leaves_no_capture_and_can_be_repeated(
+    gramoscope: Callable[..., Any], long_film: tuple[Any, ...], bench: Path, tone: Path, tmp_path: Path
+) -> None:
+    film = ("film", long_film[0], tmp_path / "c", *long_film[1:])
+    code, _ = _signalled(tmp_path, ".c.*.partial/frames/*", signal.SIGKILL, *film, more=3)
+    assert code == -signal.SIGKILL
+    assert all(name.startswith(".") for name in _names(tmp_path))
+    again = ("film", tone, tmp_path / "c", "--bench", bench, "--start", 0.03, "--seconds", 0.0012, "--quiet")
+    assert gramoscope(*again).code == 0
+    assert gramoscope("info", tmp_path / "c", "--quiet").code == 0
