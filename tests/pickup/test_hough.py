@@ -79,17 +79,29 @@ def test_points_in_two_regions_are_disputed() -> None:
     row=st.floats(-60, 60),
     column=st.floats(-160, 160),
     theta_deg=st.floats(-40, 40),
-    rho_px=st.floats(-70, 70),
+    beyond_px=st.floats(-0.5, 0.5),
+    side=st.sampled_from([-1, 1]),
     reach_px=st.floats(0.5, 12),
 )
 def test_the_region_of_a_peak_is_what_a_search_of_all_its_lines_finds(
-    row: float, column: float, theta_deg: float, rho_px: float, reach_px: float
+    row: float, column: float, theta_deg: float, beyond_px: float, side: int, reach_px: float
 ) -> None:
-    line, reach_rad = Line(np.deg2rad(theta_deg), rho_px, 1.0, 130.0, 412.5), np.deg2rad(1.5)
-    theta = line.theta_rad + np.linspace(-reach_rad, reach_rad, 2001)
-    nearest = np.abs(row * np.cos(theta) + column * np.sin(theta) - rho_px).min()
+    theta_rad, reach_rad = np.deg2rad(theta_deg), np.deg2rad(1.5)
+    theta = theta_rad + np.linspace(-reach_rad, reach_rad, 2001)
+    passes = row * np.cos(theta) + column * np.sin(theta)
+    # a peak so far off that the point lies close to the border of its region
+    rho_px = (passes.max() if side > 0 else passes.min()) + side * (reach_px + beyond_px)
+    line = Line(theta_rad, rho_px, 1.0, 130.0, 412.5)
+    nearest = np.abs(passes - rho_px).min()
     # second order in the reach is left out of the closed form: at most half the distance times the reach squared
     unsure = 0.5 * np.hypot(row, column) * reach_rad**2 + 1e-3
     inside = bool(belongs([row + 130.0], [column + 412.5], line, theta_reach_rad=reach_rad, rho_reach_px=reach_px)[0])
     if abs(nearest - reach_px) > unsure:
         assert inside == (nearest < reach_px)
+
+
+def test_a_handful_of_points_is_no_line() -> None:
+    rows, columns = _points_on(Line(0.0, 7.0, 1.0, **ORIGIN), np.arange(300.0, 340.0))
+    votes = accumulate(rows, columns, theta_rad=THETA_RAD, **ORIGIN)
+    assert len(peaks(votes, count=1, separation_px=20, least_votes=39.0)) == 1
+    assert peaks(votes, count=1, separation_px=20, least_votes=40.0) == []

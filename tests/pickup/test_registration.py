@@ -92,8 +92,15 @@ def test_camera_noise_does_not_bias_a_shift() -> None:
 
 
 def test_a_shift_beyond_reach_is_not_believed() -> None:
-    images = _film(np.array([0.0, 9.3]))
-    assert np.isnan(pair_shift_px(images[0], images[1], expected_px=2.1, rows=np.arange(37)))
+    # waves so long that the search would arrive
+    phase, column = np.arange(11)[:, None], np.arange(200)[None, :]
+    here, there = (np.rint(900 + 500 * np.cos((column + d) / 9 + phase)).astype(np.uint16) for d in (0.0, 5.3))
+    rows = np.arange(11)
+    assert pair_shift_px(here, there, expected_px=2.1, rows=rows, reach_px=3.3) == pytest.approx(5.3, abs=0.01)
+    assert np.isnan(pair_shift_px(here, there, expected_px=2.1, rows=rows, reach_px=3.1))
+    assert np.isnan(pair_shift_px(there, here, expected_px=0.4, rows=rows, reach_px=9.0)), (
+        "the record does not turn back"
+    )
 
 
 def test_uneven_steps_are_found_one_by_one() -> None:
@@ -138,8 +145,9 @@ def test_a_rendered_groove_gives_its_true_steps() -> None:
 
 
 def test_rows_with_texture_are_told_from_rows_with_noise_alone() -> None:
-    image = np.random.default_rng(4).normal(100, 2, (80, 190))
-    image[31:44] += _texture(rows=13)(np.arange(190))
+    # the noise has nearly as much power as the texture
+    image = np.random.default_rng(4).normal(120, 14, (80, 1100))
+    image[31:44] += _texture(rows=13)(np.arange(1100))
     np.testing.assert_array_equal(textured_rows(image.clip(0).astype(np.uint8)), np.arange(31, 44))
 
 

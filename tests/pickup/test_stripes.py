@@ -156,3 +156,29 @@ def test_a_glass_without_a_known_edge_has_it_in_the_middle() -> None:
     best = _best(lines, STRIPES, bench)
     assert best is not None
     assert list(best.lines) == lines
+
+
+def test_a_pair_that_fits_is_believed_before_a_stronger_line_that_stands_alone() -> None:
+    pair = [_line(STRIPES[1].row, votes=160), _line(STRIPES[2].row, votes=160)]
+    alone = _line(STRIPES[1].row - 60, votes=500, theta_deg=20)
+    best = _best([*pair, alone])
+    assert best is not None
+    assert list(best.lines) == [None, *pair]
+
+
+@pytest.mark.parametrize(("beyond_edge_px", "roles"), [(65, {2}), (-65, {0, 1})])
+def test_a_lone_stripe_is_on_its_side_of_the_glass_edge(beyond_edge_px: float, roles: set[int]) -> None:
+    line = _line(BENCH.glass_edge_row + beyond_edge_px)
+    best = _best([line])
+    assert best is not None
+    assert {role for role, found in enumerate(best.lines) if found is line} <= roles
+
+
+def test_walls_that_part_may_have_any_distance_in_a_vertical_cut() -> None:
+    # the groove rises: the outer stripe moves down the rows, those of the inner wall up
+    lines = [_line(STRIPES[0].row + 30, theta_deg=-9), *(_line(stripe.row - 30, theta_deg=9) for stripe in STRIPES[1:])]
+    settings = {"edge_row": BENCH.glass_edge_row, "glass_low": True}
+    parted = MODEL.assignments(lines, STRIPES, walls_part=True, **settings)
+    assert list(parted[0].lines) == lines
+    together = MODEL.assignments(lines, STRIPES, walls_part=False, **settings)
+    assert list(together[0].lines) != lines

@@ -61,6 +61,14 @@ def test_one_wall_alone_is_read_as_if_the_groove_moved_in_the_direction_of_the_c
     np.testing.assert_allclose(seen.variance, 1e-4 * np.tan(PHI) ** 2)
 
 
+def test_a_vertical_cut_takes_half_the_difference_however_sure_the_walls_are() -> None:
+    sigma = np.array([[0.01] * 3, [0.03] * 3])
+    seen = observe(_trace(_walls(), sigma), "vertical", wall_angle_rad=PHI)
+    # anything else would let lateral movement through
+    np.testing.assert_allclose(seen.slope, VERTICAL)
+    np.testing.assert_allclose(seen.variance, (0.01**2 + 0.03**2) / 4 * np.tan(PHI) ** 2)
+
+
 def test_the_surer_wall_weighs_more_in_a_lateral_cut() -> None:
     sigma = np.array([[0.01] * 3, [0.03] * 3])
     slope = np.array([[0.01] * 3, [0.02] * 3])

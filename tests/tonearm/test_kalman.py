@@ -91,6 +91,17 @@ def test_the_gate_gives_an_outlier_no_weight() -> None:
     assert not _smooth(arc, spoilt, variance).outlier.any()
 
 
+def test_how_far_off_an_outlier_lies_makes_nothing_more_likely() -> None:
+    arc, value, variance = _events()
+    likelihoods = []
+    for wild in (0.9, 7.0):
+        spoilt = value.copy()
+        spoilt[44] = wild
+        likelihoods.append(_smooth(arc, spoilt, variance, gate=5.0).log_likelihood)
+    assert likelihoods[0] == likelihoods[1]
+    assert likelihoods[0] < _smooth(arc, value, variance, gate=5.0).log_likelihood
+
+
 def test_the_gate_may_be_wider_than_the_weight_says() -> None:
     # twenty observations that share one error weigh little each, and yet each has its own small error
     arc, value, variance = _events()
