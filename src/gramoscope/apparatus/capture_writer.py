@@ -248,7 +248,9 @@ def _require_free(folder: Path, *, overwrite: bool) -> None:
         raise OutputError(f"{folder} is in use and is no capture", "a new or empty folder", "choose another name")
     if taken and not overwrite:
         raise OutputError(
-            f"there is a capture in {folder} already", "a new folder", "overwrite it, or choose another name"
+            f"there is a capture in {folder} already",
+            "a new folder",
+            "overwrite it (--overwrite), or choose another name",
         )
 
 

@@ -17,7 +17,7 @@ import soxr
 from gramoscope.conventions import MICROMETRES_PER_METRE, FloatArray, stereo_of_motion
 from gramoscope.disc.formats import Cut
 from gramoscope.errors import SoundError, require
-from gramoscope.listening.wav import read_sound
+from gramoscope.listening.wav import full_scale_of, read_sound
 
 TRUTH_RATE_HZ = 96_000.0
 _KEYS = ("arc_um", "lateral_um_s", "vertical_um_s", "speed_um_s")
@@ -40,7 +40,8 @@ def load_for_comparison(
     Returns
     -------
     samples : float64 array, shape (sample, channel)
-        A sound file's are parts of its full scale, a truth's are metres a second.
+        Metres a second for a truth, and for a file that says what its full scale is, as ours do; parts of full scale for
+        others.
     rate_hz : float
 
     Raises
@@ -52,7 +53,7 @@ def load_for_comparison(
         samples = truth_sound(path, rate_hz=rate_hz, cut=cut)
         return samples if samples.ndim == 2 else samples[:, np.newaxis], float(rate_hz)
     sound, file_rate_hz = read_sound(path)
-    return sound, float(file_rate_hz)
+    return sound * (full_scale_of(path) or 1.0), float(file_rate_hz)
 
 
 def truth_sound(

@@ -11,6 +11,7 @@ is clipped and counted; what is not a number becomes silence and is counted too.
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 from types import TracebackType
 from typing import Literal, Self
@@ -28,6 +29,9 @@ Subtype = Literal["PCM_24", "FLOAT"]
 FULL_SCALE_M_S = 0.5
 _STEPS = 2**23
 _READABLE = "a sound file that libsndfile reads: WAV, FLAC, Ogg, MP3, AIFF"
+
+
+_FULL_SCALE = re.compile(r"full scale = ([0-9.e+-]+) m/s")
 
 
 def quantise(samples: FloatArray) -> npt.NDArray[np.int32]:
@@ -262,6 +266,16 @@ def read_sound(
             f"{place} holds samples that are no numbers", "finite samples", "export it again as 24-bit WAV"
         )
     return samples, rate_hz
+
+
+def full_scale_of(path: str | os.PathLike[str]) -> float | None:
+    """Return the velocity (m/s) that is full scale in a file written by `WavWriter`, None for other sound files."""
+    try:
+        with soundfile.SoundFile(path) as file:
+            found = _FULL_SCALE.match(file.comment or "")
+    except (soundfile.LibsndfileError, TypeError):
+        return None
+    return float(found.group(1)) if found else None
 
 
 def _read_span(path: Path, *, start_s: float, seconds: float | None) -> tuple[FloatArray, int]:

@@ -77,7 +77,7 @@ class HoughSearch:
     def __post_init__(self) -> None:
         require(0 < self.theta_reach_deg <= 80, f"theta reaches to {self.theta_reach_deg}°", "above 0, at most 80")
         require(0 < self.theta_step_deg <= 10, f"theta steps of {self.theta_step_deg}°", "above 0, at most 10")
-        require(self.segments >= 1, f"{self.segments} segments", "at least one")
+        require(1 <= self.segments <= 64, f"{self.segments} segments", "1 … 64")
 
     @property
     def theta_rad(self) -> FloatArray:

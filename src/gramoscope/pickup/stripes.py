@@ -17,6 +17,7 @@ import numpy as np
 
 from gramoscope.apparatus.bench import Bench
 from gramoscope.conventions import INNER, OUTER, row_of_lateral_px
+from gramoscope.errors import require
 from gramoscope.microscope.focus import stripe_distance_from_middle_m
 from gramoscope.pickup.hough import Line
 
@@ -133,6 +134,12 @@ class StripeModel:
     edge_margin_px: float = 40.0
     lone_stripe: float = 0.5
     largest_jump_px: float = 20.0
+
+    def __post_init__(self) -> None:
+        for name in ("same_wall_tolerance", "other_wall_tolerance", "largest_jump_px"):
+            require(getattr(self, name) > 0, f"{name} is {getattr(self, name)}", "above 0")
+        for name in ("same_wall_slope_tolerance", "other_wall_slope_tolerance", "edge_margin_px", "lone_stripe"):
+            require(getattr(self, name) >= 0, f"{name} is {getattr(self, name)}", "zero or more")
 
     def assignments(
         self,

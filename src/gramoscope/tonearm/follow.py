@@ -59,6 +59,7 @@ class KalmanSmoother:
         require(self.lookahead > 0, f"a lookahead of {self.lookahead}", "above 0")
         require(self.gate > 1, f"a gate of {self.gate} standard errors", "above 1")
         low, high = self.corner_limits_hz
+        require(0 < self.floor_m_s <= 1, f"a floor of {self.floor_m_s} m/s", "above 0, at most 1")
         require(0 < low < high, f"corner limits of {low} … {high} Hz", "two rising frequencies")
 
 
