@@ -1,0 +1,1 @@
+"""Experiments: what others have published, done again."""
