@@ -109,3 +109,13 @@ def test_the_inspection_is_plain_data(tmp_path, bench, film, write):
     seen = inspect(open_capture(write(tmp_path / "c", bench, film(bench))), progress=lambda *done: told.append(done))
     assert json.loads(json.dumps(seen.as_dict(), allow_nan=False))["overlap_m"] is None
     assert told == [(1, 1)]
+
+
+def test_a_stripe_at_the_edge_of_the_glass_is_found():
+    bench = Bench()
+    _, deep_row, shallow_row = bench.stripe_rows()
+    between = replace(bench, cover_glass=CoverGlass(edge_row=(deep_row + shallow_row) / 2))
+    near = replace(bench, cover_glass=CoverGlass(edge_row=deep_row + 8))
+    assert list(findings_of_stripes(between)) == []
+    (finding,) = findings_of_stripes(near)
+    assert f"row {deep_row:.0f} lies at the edge" in finding

@@ -17,8 +17,8 @@ from gramoscope.signal_path import FrameGroup
 from gramoscope.turntable.rotation import pixel_rate_hz
 
 EXPOSURE = Exposure()
-NEAR_EDGE_PX = 12.0
-"""A stripe this near to the edge of the glass is hidden by a swing of 5 µm at 0.39 µm a pixel: a guess."""
+NEAR_EDGE_M = 5e-6
+"""A stripe this near to the edge of the glass is hidden by the swing of a quiet passage: a guess."""
 _SAMPLED_GROUPS = 5
 
 
@@ -246,7 +246,7 @@ def _findings_of_glass(bench: Bench, rows: tuple[float, ...]) -> Iterator[str]:
     if (beside < edge) == low:
         yield f"the stripe expected at row {beside:.0f} should be seen beside the glass, whose edge lies at {edge:.0f}"
     for row in rows:
-        if abs(row - edge) < NEAR_EDGE_PX:
+        if abs(row - edge) * bench.sensor.pixel_pitch_m < NEAR_EDGE_M:
             yield (
                 f"the stripe expected at row {row:.0f} lies at the edge of the glass ({edge:.0f}): the groove's swing will "
                 "hide it; move the glass midway between the two stripes of one wall"
