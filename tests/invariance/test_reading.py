@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tifffile
 
 from gramoscope.apparatus.bench import Bench, Sequence
 from gramoscope.apparatus.capture import open_capture
@@ -77,6 +78,9 @@ def test_a_film_stored_mirrored_is_read_to_the_same_bits(
     with CaptureWriter(tmp_path / "mirrored", bench) as writer:
         for number in range(2):
             writer.write_group(number, group.images, arc_start_m=group.arc_start_m)
+    stored = tifffile.imread(tmp_path / "mirrored" / "frames" / "g000001.tif")
+    down, along = (-1 if rows == "outward" else 1), (-1 if columns == "backward" else 1)
+    np.testing.assert_array_equal(stored, group.images[:, ::down, ::along])
     capture = open_capture(tmp_path / "mirrored")
     _assert_same(SeedPaperPickup(capture.bench).read(capture.group(1)), SeedPaperPickup(bench).read(group))
 

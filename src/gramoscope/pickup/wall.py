@@ -11,8 +11,9 @@ intercept for each depth, and with a single line the angle of the wall is simply
 
 The paper calls its estimator robust and refers to an earlier report for it; the report could not be found, so this one is
 ours. It starts from the *repeated median* (Siegel, Biometrika 69, 1982), which withstands just under half of the points
-being wrong, and ends with a few rounds of reweighted least squares with Tukey's biweight (c = 4.685 robust standard
-deviations), which is 95 % as efficient as least squares when nothing is wrong.
+being wrong, taken over the whole neighbourhood and over either half, because damage comes in one piece. It ends with a few
+rounds of reweighted least squares with Tukey's biweight (c = 4.685 robust standard deviations), which is 95 % as efficient
+as least squares when nothing is wrong.
 """
 
 from __future__ import annotations
@@ -336,8 +337,9 @@ class WallOrientation:
         """Over how many stations errors count as one and the same: half a neighbourhood.
 
         The slopes of two neighbourhoods that overlap share errors when they overlap much, and err the opposite way when
-        they overlap little, because a centroid that tilts the one up tilts the other down. Half is what makes the
-        smoothed error bars come out true on rendered grooves (`tests/recovery`).
+        they overlap little, because a centroid that tilts the one up tilts the other down. Half leaves the smallest
+        errors after smoothing; the smoothed error bars are then too wide on rendered grooves, by a half and more
+        (`tests/recovery`).
         """
         return max(0.5 * self.neighbourhood_px / self.stride_px, 1.0)
 
