@@ -10,7 +10,6 @@ from scipy.signal import butter, sosfiltfilt
 
 from gramoscope.apparatus.bench import Bench
 from gramoscope.conventions import FloatArray, row_of_lateral_px
-from gramoscope.pickup.stripes import expected_stripes
 from gramoscope.signal_path import FrameGroup
 from gramoscope.simulation.passage import Passage
 from gramoscope.simulation.render import cut_passage, filmed_group, render_group
@@ -34,7 +33,7 @@ class Take:
         height_px = self.scene.bench.sensor.height_px
         rest = row_of_lateral_px(0.0, height_px=height_px, pixel_pitch_m=group.pixel_pitch_m)
         moved = row_of_lateral_px(lateral_m, height_px=height_px, pixel_pitch_m=group.pixel_pitch_m) - rest
-        return np.array([stripe.row + moved for stripe in expected_stripes(self.scene.bench)])
+        return np.array([stripe.row + moved for stripe in self.scene.bench.stripes()])
 
     def true_starts_m(self, group: FrameGroup) -> FloatArray:
         """Return where column 0 of each frame really was."""

@@ -5,22 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gramoscope.apparatus.bench import Bench
+from gramoscope.apparatus.bench import Bench, Stripe
 from gramoscope.conventions import INNER, OUTER
 from gramoscope.microscope.cover_glass import CoverGlass
 from gramoscope.pickup.hough import Line
 from gramoscope.pickup.stripes import (
     Assignment,
-    Stripe,
     StripeModel,
-    expected_stripes,
     kept_stripes,
     walls_read,
 )
 from gramoscope.simulation.scene import filming_bench
 
 BENCH = filming_bench(height_px=512)
-STRIPES = expected_stripes(BENCH)
+STRIPES = BENCH.stripes()
 MODEL = StripeModel()
 COLUMN = 160.0
 
@@ -44,9 +42,15 @@ def _mirrored(bench: Bench) -> Bench:
     return replace(bench, cover_glass=replace(glass, side="high", edge_row=edge_row))
 
 
-@pytest.mark.parametrize("bench", [BENCH, _mirrored(BENCH), replace(BENCH, cover_glass=None)])
-def test_the_stripes_expected_are_those_of_the_bench(bench: Bench) -> None:
-    np.testing.assert_allclose([stripe.row for stripe in expected_stripes(bench)], bench.stripe_rows())
+def test_the_stripes_lie_where_walls_at_45_degrees_cross_the_two_sharp_planes() -> None:
+    deep_m, shallow_m = 75e-6 - 20e-6 - 0.11e-3 * (1 - 1 / 1.515), 75e-6 - 20e-6
+    for bench, lateral_m in (
+        (BENCH, (-deep_m, deep_m, shallow_m)),
+        (_mirrored(BENCH), (-shallow_m, -deep_m, deep_m)),
+        (replace(BENCH, cover_glass=None), (-shallow_m, shallow_m)),
+    ):
+        rows = 255.5 + np.array(lateral_m) / bench.sensor.pixel_pitch_m
+        np.testing.assert_allclose(bench.stripe_rows(), rows)
 
 
 def test_two_stripes_lie_on_the_wall_that_the_glass_does_not_cover_whole() -> None:
@@ -54,7 +58,7 @@ def test_two_stripes_lie_on_the_wall_that_the_glass_does_not_cover_whole() -> No
     assert [stripe.through_glass for stripe in STRIPES] == [True, True, False]
     assert kept_stripes(STRIPES) == (1, 2)
     assert walls_read(BENCH) == ("inner",)
-    high = expected_stripes(_mirrored(BENCH))
+    high = _mirrored(BENCH).stripes()
     assert [stripe.wall for stripe in high] == [OUTER, OUTER, INNER]
     assert kept_stripes(high) == (0, 1)
     assert walls_read(_mirrored(BENCH)) == ("outer",)
@@ -62,7 +66,7 @@ def test_two_stripes_lie_on_the_wall_that_the_glass_does_not_cover_whole() -> No
 
 def test_without_a_glass_both_walls_are_kept() -> None:
     bench = replace(BENCH, cover_glass=None)
-    assert kept_stripes(expected_stripes(bench)) == (0, 1)
+    assert kept_stripes(bench.stripes()) == (0, 1)
     assert walls_read(bench) == ("inner", "outer")
 
 
@@ -98,7 +102,7 @@ def test_a_false_line_from_damage_is_no_stripe() -> None:
 
 def test_a_mirrored_glass_mirrors_the_roles() -> None:
     bench = _mirrored(BENCH)
-    stripes = expected_stripes(bench)
+    stripes = bench.stripes()
     lines = [_line(stripe.row + 6) for stripe in stripes]
     best = _best(lines, stripes, bench)
     assert best is not None

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from gramoscope.camera.sensor import Sensor
-from gramoscope.conventions import row_of_lateral_px
+from gramoscope.conventions import INNER, OUTER, row_of_lateral_px
 from gramoscope.disc.formats import Disc
 from gramoscope.errors import require
 from gramoscope.microscope.cover_glass import CoverGlass
@@ -49,6 +49,27 @@ class Sequence:
 
 
 @dataclass(frozen=True)
+class Stripe:
+    """A place where a wall is sharp.
+
+    Attributes
+    ----------
+    wall : int
+        `INNER` or `OUTER`.
+    depth_below_land_m : float
+        Where the wall is sharp.
+    row : float
+        Canonical row, for a groove at rest.
+    through_glass : bool
+    """
+
+    wall: int
+    depth_below_land_m: float
+    row: float
+    through_glass: bool
+
+
+@dataclass(frozen=True)
 class Bench:
     """Disc, turntable, microscope, glass and camera, bolted together.
 
@@ -85,8 +106,8 @@ class Bench:
             + (sensor.width_px - 1) * sensor.pixel_pitch_m
         )
 
-    def stripe_rows(self, groove_middle_m: float = 0.0) -> tuple[float, ...]:
-        """Return the canonical rows where sharp stripes are expected, in rising order, for a groove at rest.
+    def stripes(self, groove_middle_m: float = 0.0) -> tuple[Stripe, ...]:
+        """Return the sharp stripes that are expected of a groove at rest, by rising row.
 
         Parameters
         ----------
@@ -95,25 +116,27 @@ class Bench:
 
         Returns
         -------
-        tuple of float
-            Three rows for a dual-focal objective: two through the glass and one beside it; two without a glass. A row
-            may lie outside the picture. Whether the glass edge hides one is not considered.
+        tuple of Stripe
+            Three for a dual-focal objective: both walls through the glass, and one wall once more beside it; two without
+            a glass. A row may lie outside the picture. Whether the glass edge hides one is not considered.
         """
-        disc, sensor = self.disc, self.sensor
-
-        def distance(depth_m: float) -> float:
-            return stripe_distance_from_middle_m(
-                depth_m, groove_width_m=disc.groove_width_m, wall_angle_rad=disc.wall_angle_rad
-            )
-
-        deep = distance(self.focus_through_glass_m)
-        lateral = [-deep, deep]
-        if self.cover_glass is not None:
-            shallow = distance(self.focus_below_land_m)
-            lateral.append(shallow if self.cover_glass.side == "low" else -shallow)
-        rows = row_of_lateral_px(
-            [groove_middle_m + place for place in sorted(lateral)],
-            height_px=sensor.height_px,
-            pixel_pitch_m=sensor.pixel_pitch_m,
+        glass = self.cover_glass
+        places = [(wall, self.focus_through_glass_m, glass is not None) for wall in (OUTER, INNER)]
+        if glass is not None:
+            places.append((INNER if glass.side == "low" else OUTER, self.focus_below_land_m, False))
+        stripes = (
+            Stripe(wall, depth, self._row_of(wall, depth, groove_middle_m), through) for wall, depth, through in places
         )
-        return tuple(float(row) for row in rows)
+        return tuple(sorted(stripes, key=lambda stripe: stripe.row))
+
+    def _row_of(self, wall: int, depth_m: float, groove_middle_m: float) -> float:
+        distance_m = stripe_distance_from_middle_m(
+            depth_m, groove_width_m=self.disc.groove_width_m, wall_angle_rad=self.disc.wall_angle_rad
+        )
+        lateral_m = groove_middle_m + (distance_m if wall == INNER else -distance_m)
+        sensor = self.sensor
+        return float(row_of_lateral_px(lateral_m, height_px=sensor.height_px, pixel_pitch_m=sensor.pixel_pitch_m))
+
+    def stripe_rows(self, groove_middle_m: float = 0.0) -> tuple[float, ...]:
+        """Return the canonical rows of `stripes`, in rising order."""
+        return tuple(stripe.row for stripe in self.stripes(groove_middle_m))

@@ -13,11 +13,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from gramoscope.apparatus.bench import Bench
+from gramoscope.apparatus.bench import Bench, Stripe
 from gramoscope.conventions import FloatArray, IntArray, rad
 from gramoscope.errors import require
 from gramoscope.pickup.hough import Accumulator, Line, accumulate, peaks, segment
-from gramoscope.pickup.stripes import Stripe, StripeModel
+from gramoscope.pickup.stripes import StripeModel
 
 CANDIDATE_LINES = 6
 """So many peaks of a segment are considered: the three stripes, and what damage adds."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from gramoscope.apparatus.bench import Bench
+from gramoscope.apparatus.bench import Bench, Stripe
 from gramoscope.camera.exposure import Exposure
 from gramoscope.conventions import FloatArray, IntArray, lateral_of_row_m
 from gramoscope.pickup.centreline import Centreline, centroids, discard_damaged_columns, fill_voids
@@ -21,7 +21,7 @@ from gramoscope.pickup.flow.horn_schunck import Flow, FlowMethod, GrooveHornSchu
 from gramoscope.pickup.in_focus import InFocus
 from gramoscope.pickup.registration import Canvas, frame_shifts, register
 from gramoscope.pickup.search import HoughSearch, Segment, line_rows, line_slopes
-from gramoscope.pickup.stripes import Stripe, StripeModel, expected_stripes, kept_stripes
+from gramoscope.pickup.stripes import StripeModel, kept_stripes
 from gramoscope.pickup.wall import Planes, WallOrientation, wall_angle_rad
 from gramoscope.pickup.wall_samples import WallSamples, samples_of_wall
 from gramoscope.quality import Quality, no_flags
@@ -137,7 +137,7 @@ class SeedPaperPickup:
         flow = self._flow(derivatives, step_m) if index.size > 1 else None
         in_focus = self.in_focus.mask(derivatives, flow) & (canvas.mean < NEARLY_WHITE * group.white_level)
         rows, columns = np.nonzero(in_focus)
-        stripes = expected_stripes(self.bench)
+        stripes = self.bench.stripes()
         segments = self.hough.find(
             rows, columns, canvas.mean.shape, stripes=stripes, stripe_model=self.stripe_model, bench=self.bench
         )

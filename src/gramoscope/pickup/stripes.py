@@ -15,56 +15,15 @@ from itertools import combinations
 
 import numpy as np
 
-from gramoscope.apparatus.bench import Bench
-from gramoscope.conventions import INNER, OUTER, row_of_lateral_px
+from gramoscope.apparatus.bench import Bench, Stripe
+from gramoscope.conventions import INNER, OUTER
 from gramoscope.errors import require
-from gramoscope.microscope.focus import stripe_distance_from_middle_m
 from gramoscope.pickup.hough import Line
 
 WRONG_SIDE = 0.25
 """What a line on the wrong side of the glass edge counts: the edge is known only roughly."""
 KEPT_ASSIGNMENTS = 24
 """So many ways to read a segment are weighed against those of its neighbours."""
-
-
-@dataclass(frozen=True)
-class Stripe:
-    """A stripe that the bench leads us to expect.
-
-    Attributes
-    ----------
-    wall : int
-        `INNER` or `OUTER`.
-    depth_below_land_m : float
-        Where the wall is sharp.
-    row : float
-        Canonical row, for a groove at rest in the middle of the picture.
-    through_glass : bool
-    """
-
-    wall: int
-    depth_below_land_m: float
-    row: float
-    through_glass: bool
-
-
-def expected_stripes(bench: Bench) -> tuple[Stripe, ...]:
-    """Return the stripes that a bench shows, by rising row: three with a cover glass, two without."""
-    glass = bench.cover_glass
-    places = [(wall, bench.focus_through_glass_m, glass is not None) for wall in (OUTER, INNER)]
-    if glass is not None:
-        places.append((INNER if glass.side == "low" else OUTER, bench.focus_below_land_m, False))
-
-    def row(wall: int, depth_m: float) -> float:
-        distance = stripe_distance_from_middle_m(
-            depth_m, groove_width_m=bench.disc.groove_width_m, wall_angle_rad=bench.disc.wall_angle_rad
-        )
-        lateral_m = distance if wall == INNER else -distance
-        sensor = bench.sensor
-        return float(row_of_lateral_px(lateral_m, height_px=sensor.height_px, pixel_pitch_m=sensor.pixel_pitch_m))
-
-    stripes = (Stripe(wall, depth_m, row(wall, depth_m), through) for wall, depth_m, through in places)
-    return tuple(sorted(stripes, key=lambda stripe: stripe.row))
 
 
 def kept_stripes(stripes: Sequence[Stripe]) -> tuple[int, ...]:
@@ -78,7 +37,7 @@ def kept_stripes(stripes: Sequence[Stripe]) -> tuple[int, ...]:
 
 def walls_read(bench: Bench) -> tuple[str, ...]:
     """Return the names of the walls that are read from a bench's pictures."""
-    stripes = expected_stripes(bench)
+    stripes = bench.stripes()
     walls = {stripes[i].wall for i in kept_stripes(stripes)}
     return tuple(name for wall, name in ((INNER, "inner"), (OUTER, "outer")) if wall in walls)
 

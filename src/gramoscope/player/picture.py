@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from gramoscope.apparatus.bench import Stripe
 from gramoscope.apparatus.capture import Capture
 from gramoscope.conventions import INNER
 from gramoscope.listening.figures import groove_figure
 from gramoscope.pickup.seed_paper import Reading
-from gramoscope.pickup.stripes import Stripe
 from gramoscope.player.monitor import Monitor
 from gramoscope.player.recipe import Recipe
 
