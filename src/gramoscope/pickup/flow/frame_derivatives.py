@@ -112,8 +112,9 @@ def four_point_derivatives(film: FloatArray, *, border_px: int) -> Derivatives:
     kernel = FOUR_POINT.astype(np.float64)
     onward = np.tensordot(kernel, film[middle - 2 : middle + 3], axes=1)
     along, down = (ndimage.correlate1d(film[middle], kernel, axis=axis, mode="nearest") for axis in (1, 0))
-    inside = np.zeros(onward.shape, np.bool_)
-    inside[border_px : inside.shape[0] - border_px, border_px : inside.shape[1] - border_px] = True
+    height, width = film.shape[1:]
+    inside = np.zeros((height, width), np.bool_)
+    inside[border_px : height - border_px, border_px : width - border_px] = True
     x, y, t = (np.where(inside, d, 0.0).astype(np.float32) for d in (along, down, onward))
     return Derivatives(x, y, t)
 
