@@ -38,9 +38,10 @@ class Observations:
     variance: FloatArray
     flags: FlagArray
 
-    def thinned(self, step: int) -> Observations:
-        """Return every `step`-th sample."""
-        return Observations(self.arc_m[::step], self.slope[::step], self.variance[::step], self.flags[::step])
+    def thinned(self, step: int, first: int = 0) -> Observations:
+        """Return every `step`-th sample from the `first` on."""
+        keep = slice(first, None, step)
+        return Observations(self.arc_m[keep], self.slope[keep], self.variance[keep], self.flags[keep])
 
 
 def observe(trace: WallTrace, direction: Direction, *, wall_angle_rad: float) -> Observations:

@@ -192,12 +192,19 @@ class Tonearm:
         return GrooveMotion(float(grid[0]), step_m, nothing, nothing, velocity, error, flags)
 
     def _learn(self, traces: list[WallTrace]) -> Prior:
-        """Learn from samples so far apart that their errors are their own."""
+        """Learn from samples so far apart that their errors are their own; the median over all ways to choose them."""
+        seen = [(observe(t, self.direction, wall_angle_rad=self.wall_angle_rad), t.correlation_samples) for t in traces]
+        step = int(np.ceil(max(correlation for _, correlation in seen)))
+        priors = [self._learn_from([one.thinned(step, first) for one, _ in seen]) for first in range(step)]
+        return Prior(
+            float(np.median([prior.sigma for prior in priors])),
+            float(np.median([prior.rate_per_m for prior in priors])),
+        )
+
+    def _learn_from(self, stretches: list[Observations]) -> Prior:
         buffer = _Buffer.empty()
-        for trace in traces:
-            seen = observe(trace, self.direction, wall_angle_rad=self.wall_angle_rad)
-            apart = seen.thinned(int(np.ceil(trace.correlation_samples)))
-            buffer = buffer.with_stretch(apart, 1.0)
+        for seen in stretches:
+            buffer = buffer.with_stretch(seen, 1.0)
         buffer = buffer.part(np.argsort(buffer.arc_m, kind="stable"))
         speed = float(self.rotation.speed_at_m_s(0.0))
         low, high = (2 * np.pi * corner / speed for corner in self.smoother.corner_limits_hz)
