@@ -207,7 +207,7 @@ def outliers_figure(outcome: Outcome) -> Figure:
         axes.axhline(bound(1.0, 100), color=ink.GREY, linestyle=":", label="bound without outliers")
         ink.dress(axes, x="centroids that are wrong (%)", y="error of the slope (rms)" if axes is figure.axes[0] else "")
         ink.heading(axes, name)
-    figure.axes[0].legend(fontsize=ink.SMALL, frameon=False, loc="center left", bbox_to_anchor=(0.0, 0.55))
+    figure.axes[0].legend(fontsize=ink.SMALL, frameon=False, loc="upper left")
     return figure
 
 
