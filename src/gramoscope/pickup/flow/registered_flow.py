@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gramoscope.errors import require
-from gramoscope.pickup.flow.derivatives import group_derivatives, texture_contrast
+from gramoscope.pickup.flow.derivatives import Derivatives, group_derivatives, texture_contrast
 from gramoscope.pickup.flow.horn_schunck import Flow, FlowMethod
 from gramoscope.pickup.registration import pair_shift_px, register, textured_rows
 from gramoscope.signal_path import ImageArray
@@ -84,10 +84,16 @@ def registered_flow(
     contrast = texture_contrast(derivatives.x)
     if relative_weights and contrast > 0:
         derivatives = derivatives.scaled(1 / contrast)
-    remaining = method.flow(derivatives)
+    remaining = method.flow(_where_seen(derivatives, canvas.frames, least=max(2, (len(images) + 1) // 2)))
     here = step * (len(images) // 2)
     u, v = (_window(field, start=here, width=images.shape[2]) for field in (remaining.u, remaining.v))
     return Flow(u - np.float32(step), v)
+
+
+def _where_seen(derivatives: Derivatives, frames: npt.NDArray[np.int64], *, least: int) -> Derivatives:
+    """Zero in the columns that few frames saw: the trend of two frames is mostly noise, and a zero says nothing."""
+    seen = (frames >= least).astype(np.float32)
+    return Derivatives(derivatives.x * seen, derivatives.y * seen, derivatives.t * seen)
 
 
 def _window(field: Float32Array, *, start: float, width: int) -> Float32Array:
