@@ -140,8 +140,8 @@ def tree_section(page: Page, tree: ImageArray, others: dict[str, PairFlow]) -> l
         flow_figures.speed_maps(tree[flow_tree.MIDDLE], maps, limits_px=(0.0, 2.6)),
         "tree",
         "Frame 20 of the translating tree and u of five flows on one scale. Blurred or even regions get their flow from their "
-        "neighbours only, and 100 sweeps do not carry it far. Registered frames leave the right border to few of them, and there "
-        "the flow is unsure.",
+        "neighbours only, and 100 sweeps do not carry it far. Registered frames leave the right border to few of them, and "
+        "there the flow is unsure.",
     )
     tree_table(page, rows)
     page.say(f"""Errors over the points at least {BORDER_PX} px from the border, as in the published table, and over the
@@ -154,30 +154,26 @@ def tree_words(page: Page, p: Published, by_sweeps: dict[str, list[float]]) -> N
     filmed, registered = by_sweeps.values()
     at, registered_at = (dict(zip(SWEEPS, errors, strict=True)) for errors in (filmed, registered))
     page.say(f"""{SOURCE}. Frames 10 to 30 of the translating tree are 150 × 150 pixels of 8 bit; the true flow at frame 20
-        has v = 0 and a u that rises linearly from 1.73 px/frame at the left to 2.30 at the right. The error is the angle
-        between (u, v, 1) and the true one. Horn–Schunck with α = 0.5 (its square weighs against squared grey levels a
-        pixel,
-        0 … 255) and 100 Jacobi sweeps from zero. *Original*: the first differences of a 2 × 2 × 2 cube of frames 20 and 21.
-        *Modified*: Gaussian of σ = {SIGMA} in space and time, 11 points long, then central differences of four points; 15
-        frames take part. Zero derivatives within 7 px of the border, where the kernels do not fit. The statistics leave out
-        twice that, {BORDER_PX} px, and {BORDER_ORIGINAL_PX} px for the original, as the authors' program does: with that
-        border
-        the density at gradients of 5 and more comes out as {percent(p.density, 1)}, as printed.
+        has v = 0 and a u that rises linearly from 1.73 px/frame at the left to 2.30 at the right. The error is
+        the angle between (u, v, 1) and the true one. Horn–Schunck with α = 0.5 (its square weighs against squared
+        grey levels a pixel, 0 … 255) and 100 Jacobi sweeps from zero. *Original*: the first differences of a 2 ×
+        2 × 2 cube of frames 20 and 21. *Modified*: Gaussian of σ = {SIGMA} in space and time, 11 points long,
+        then central differences of four points; 15 frames take part. Zero derivatives within 7 px of the border,
+        where the kernels do not fit. The statistics leave out twice that, {BORDER_PX} px, and
+        {BORDER_ORIGINAL_PX} px for the original, as the authors' program does: with that border the density at
+        gradients of 5 and more comes out as {percent(p.density, 1)}, as printed.
 
-        **The fringe.** A clean Gaussian gives a smaller spread than the table ({p.modified.spread_deg:.2f}° against
-        {MODIFIED[1]:.2f}°). The authors' program (`horn.c`, by its source) smooths in three
-        passes and leaves zeros where a kernel does not fit; the last
-        pass reads these zeros as a picture, so five columns at either side grow dark, stand still, and their false flow
-        spreads
-        inwards. Done that way, the flow here errs by {p.fringed}, and by {p.fringed_steep} at steep points.
+        **The fringe.** A clean Gaussian gives a smaller spread than the table ({p.modified.spread_deg:.2f}°
+        against {MODIFIED[1]:.2f}°). The authors' program (`horn.c`, by its source) smooths in three passes and
+        leaves zeros where a kernel does not fit; the last pass reads these zeros as a picture, so five columns at
+        either side grow dark, stand still, and their false flow spreads inwards. Done that way, the flow here
+        errs by {p.fringed}, and by {p.fringed_steep} at steep points.
 
         **The sweeps.** 100 sweeps are not enough for this film: after 50 the error is {at[50]:.2f}°, after 100
         {at[100]:.2f}°, after 200 {at[200]:.2f}°, after {SWEEPS[-1]} {at[SWEEPS[-1]]:.2f}°. α = 0.5 is tiny beside
-        gradients of 5
-        and more: sharp points are settled at once and even regions wait until flow has spread to them, two pixels a
-        frame of it. On
-        registered frames only a fraction of a pixel has to spread: {registered_at[10]:.2f}° after 10 sweeps,
-        {registered_at[100]:.2f}° after 100.""")
+        gradients of 5 and more: sharp points are settled at once and even regions wait until flow has spread to
+        them, two pixels a frame of it. On registered frames only a fraction of a pixel has to spread:
+        {registered_at[10]:.2f}° after 10 sweeps, {registered_at[100]:.2f}° after 100.""")
 
 
 def registered_words(page: Page, tree: ImageArray, rows: Sequence[Row]) -> None:
@@ -189,40 +185,34 @@ def registered_words(page: Page, tree: ImageArray, rows: Sequence[Row]) -> None:
     others = [scores[row.name, 2].angle_deg for row in rows if not _ours(row)]
     better = sum(error < pair.angle_deg for error in others)
     page.say(f"""α, σ and the sweeps stay as published, the frames are the 11 that their Gaussian spans. Only one thing is
-        added, what the player does with every group: the motion that all points share (found from the frames, {step:.2f}
-        px) is
-        taken off, the frames are laid over each other, and Horn–Schunck finds what remains from their mean and their trend
-        (`registered_flow`). The common motion alone, one number for the whole picture, errs by {scores[COMMON, 11]};
-        what the
-        flow adds brings it to {scores["registered, Horn–Schunck", 11]}. The groove constraint (v near zero, u alike up and
-        down; α = β = γ) is true of this film as it is of a record, and gives
-        {scores["registered, with the groove constraint", 11]}; beside methods that may not know so much the row before
-        counts.
+        added, what the player does with every group: the motion that all points share (found from the frames,
+        {step:.2f} px) is taken off, the frames are laid over each other, and Horn–Schunck finds what remains from
+        their mean and their trend (`registered_flow`). The common motion alone, one number for the whole picture,
+        errs by {scores[COMMON, 11]}; what the flow adds brings it to {scores["registered, Horn–Schunck", 11]}.
+        The groove constraint (v near zero, u alike up and down; α = β = γ) is true of this film as it is of a
+        record, and gives {scores["registered, with the groove constraint", 11]}; beside methods that may not know
+        so much the row before counts.
 
-        From two frames only it errs by {pair} (the common motion alone: {scores[COMMON, 11]}): what it gains comes from
-        the other frames.""")
+        From two frames only it errs by {pair} (the common motion alone: {scores[COMMON, 11]}): what it gains
+        comes from the other frames.""")
     if others:
         page.say(f"""Of the {len(others)} programs of others, which take two frames, {better} do better than ours does from
-            two, and {sum(e < scores["registered, Horn–Schunck", 11].angle_deg for e in others)} better than ours from 11.""")
+        two, and {sum(e < scores["registered, Horn–Schunck", 11].angle_deg for e in others)} better than ours from
+        11.""")
 
 
 def groove_section(page: Page, groove: Groove, rows: list[Row]) -> None:
     """Write what concerns the groove."""
     page.head("Groove frames with known flow")
     height, width = groove.images.shape[1:]
-    page.say(f"""A simulated stretch of an ordinary 78 with aluminium powder, {width} columns × {height} rows, with
-        camera noise:
-        the record slides by {groove.step_px:.3f} px from frame to frame, at every row alike. Sharp zones are the points
-        within
-        {SHARP_REACH_PX:.0f} rows of where a stripe truly runs, {percent(groove.sharp.mean(), 1)} of the picture;
-        everywhere else
-        the texture is blurred and the camera's noise rules. Ours runs with the weights of the recipe `seed-paper`, in
-        units of
-        the sharpest texture's gradient, the shear of the walls left at zero, and begins its search for the common motion
-        at the
-        nominal step, which a capture's log tells. The truth is one number for the whole picture, so registration does
-        nearly all
-        of the work; what is asked of the flow is to leave it alone where there is nothing to see.""")
+    page.say(f"""A simulated stretch of an ordinary 78 with aluminium powder, {width} columns × {height} rows, with camera
+        noise: the record slides by {groove.step_px:.3f} px from frame to frame, at every row alike. Sharp zones
+        are the points within {SHARP_REACH_PX:.0f} rows of where a stripe truly runs,
+        {percent(groove.sharp.mean(), 1)} of the picture; everywhere else the texture is blurred and the camera's
+        noise rules. Ours runs with the weights of the recipe `seed-paper`, in units of the sharpest texture's
+        gradient, the shear of the walls left at zero, and begins its search for the common motion at the nominal
+        step, which a capture's log tells. The truth is one number for the whole picture, so registration does
+        nearly all of the work; what is asked of the flow is to leave it alone where there is nothing to see.""")
     groove_table(page, rows, groove)
     shown = {
         f"{row.name}, {row.frames} frames": end_point_error_px(row.flow, groove.true)
@@ -232,8 +222,8 @@ def groove_section(page: Page, groove: Groove, rows: list[Row]) -> None:
     page.picture(
         flow_figures.groove_maps(groove.images[MIDDLE], groove.sharp, shown),
         "groove",
-        "A groove frame and where flows err. Between the sharp zones there is little but noise and blurred texture; a point is dark "
-        "where the flow is right all the same.",
+        "A groove frame and where flows err. Between the sharp zones there is little but noise and blurred texture; a point is "
+        "dark where the flow is right all the same.",
     )
 
 
@@ -256,7 +246,7 @@ def compare(page: Page, groove: Groove, tree_methods: Sequence[Row], groove_meth
         "peers",
         "Error over time, all in one run on one core. Blue: ours, orange squares: others.",
     )
-    page.say("\n\n".join(lists[:2]))
+    page.say("\n\n".join(lists[:-1]))
 
 
 def _ours(row: Row) -> bool:
@@ -283,10 +273,11 @@ def make(folder: Path = FOLDER) -> Page:
     groove_methods = groove_rows(groove, others)
     groove_section(page, groove, groove_methods)
     compare(page, groove, methods, groove_methods)
-    page.say("""The other programs run with the settings that they bring (Farnebäck: those of OpenCV's example) on two
-        frames, which is
-        what they take; none was tuned, ours neither. They are made for scenes that move in many ways. Times are the best of
-        up to five runs after one that does not count; scikit-image's are those of NumPy code, OpenCV's of one thread.""")
+    if others:
+        page.say("""The other programs run with the settings that they bring (Farnebäck: those of OpenCV's example) on two
+            frames, which is what they take; none was tuned, ours neither. They are made for scenes that move in many
+            ways. Times are the best of up to five runs after one that does not count; scikit-image's are those of
+            NumPy code, OpenCV's of one thread.""")
     for sentence in missing:
         page.say(sentence)
     page.write()
