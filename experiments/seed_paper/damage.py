@@ -59,9 +59,7 @@ def film(damaged: bool = True) -> Take:
     bench = short_bench(frames=FRAMES, groups=GROUP + 1)
     width_m = bench.sensor.width_px * bench.sensor.pixel_pitch_m
     start_m = GROUP * bench.sequence.group_step_m
-    chip = OneChip(
-        middle_m=start_m + (CHIP_FROM + CHIP_TO) / 2 * width_m, length_m=(CHIP_TO - CHIP_FROM) * width_m
-    )
+    chip = OneChip(middle_m=start_m + (CHIP_FROM + CHIP_TO) / 2 * width_m, length_m=(CHIP_TO - CHIP_FROM) * width_m)
     scene = Scene(bench, seed=SEED, **({"damage": chip} if damaged else {}))
     sound = noise_sound(low_hz=200, high_hz=4000, seconds=0.1, seed=SEED)
     return film_in_memory(sound, NOISE_RATE_HZ, scene, [GROUP])
@@ -129,13 +127,17 @@ def slopes_in_gap(take: Take, reading: Reading) -> tuple[float, float, float]:
 
 def damage_figure(take: Take, reading: Reading) -> Figure:
     """Draw the frame, the flow, the accumulator and the lines, as in figure 7 of the paper."""
-    figure = ink.blank_figure(9.6, 5.6)
-    (a, b), (c, d) = figure.subplots(2, 2)
+    figure = ink.blank_figure(9.2, 5.0)
+    (a, b), (c, d) = figure.subplots(2, 2, height_ratios=[1, 1.7])
     draw_picture(a, take.groups[0].images[0].astype(np.float64))
     draw_places(b, reading)
     draw_accumulator(c, reading.segments[0], straight_search(), reading.segments[0].lines)
     draw_regions(d, reading)
-    for axes, text in zip((a, b, c, d), ("a  Damaged groove", "b  Places with flow", "c  Accumulator, peaks boxed", "d  Regions and lines"), strict=True):
+    for axes, text in zip(
+        (a, b, c, d),
+        ("a  Damaged groove", "b  Places with flow", "c  Accumulator, peaks boxed", "d  Regions and lines"),
+        strict=True,
+    ):
         ink.heading(axes, text)
     return figure
 
@@ -148,38 +150,78 @@ def make(folder: Path = FOLDER) -> Page:
     whole = slopes_in_gap(film(damaged=False), read(film(damaged=False)))
     page = Page("damage", "A groove with half of its wall missing (figure 7)", folder=folder)
     page.finding = (
-        f"With {percent(CHIP_TO - CHIP_FROM)} of a wall broken out, both lines are found and carried across; in the gap they lie "
-        f"{found[0].line_error_px:.1f} and {found[1].line_error_px:.1f} pixels (rms) from where the wall was, and {percent(filled)} of the samples there are flagged."
+        f"With {percent(CHIP_TO - CHIP_FROM)} of a wall broken out, both lines are found and carried "
+        "across; in the gap they lie "
+        f"{found[0].line_error_px:.1f} and {found[1].line_error_px:.1f} pixels (rms) from where the "
+        f"wall was, and {percent(filled)} of the samples there are flagged."
     )
-    page.say(f"""The group of [in focus](in_focus.md) once more, with a piece broken out of the inner wall: {percent(CHIP_TO - CHIP_FROM)} of the picture's
-        length, nearly the whole height of the wall, 16 µm deep, rough and of another brightness. The stripes of that wall are the
-        two that the paper keeps.""")
-    page.picture(damage_figure(take, reading), "groove", """Damaged groove, places with flow, accumulator with its three peaks, and the lines carried across the gap; compare figure 7 of the
-        paper. Violet: columns filled in from the line. Red: points in no region, disputed, or in columns set aside.""")
+    page.say(f"""The group of [in focus](in_focus.md) once more, with a piece broken out of the inner wall:
+        {percent(CHIP_TO - CHIP_FROM)} of the picture's length, nearly the whole height of the wall, 16 µm deep, rough
+        and of another brightness. The stripes of that wall are the two that the paper keeps.""")
+    page.picture(
+        damage_figure(take, reading),
+        "groove",
+        """Damaged groove, places with flow, accumulator with its three peaks, and the lines carried across the gap;
+        compare figure 7 of the paper. Violet: columns filled in from the line. Red: points in no region, disputed, or
+        in columns set aside.""",
+    )
     page.claims(
         [
-            Claim("7, fig. 7a", "nearly half of the groove walls in this image is missing", f"{percent(CHIP_TO - CHIP_FROM)} of the inner wall"),
-            Claim("7, fig. 7b", "some vertical stripes caused by the damage", f"{percent(columns_set_aside(reading), 1)} of the columns hold so many points outside the regions that they are set aside",
-                  "setting them aside is ours: where a vertical stripe crosses a region it pulls the centroid"),
-            Claim("7, fig. 7c", "the Hough transform segments the lines, ignoring the vertical stripes", f"{sum(line is not None for line in reading.segments[0].lines)} lines",
-                  "a vertical stripe has θ near 90°, outside of ± 45°: no line can collect its votes"),
-            Claim("7, fig. 7d", "missing parts are filled in using the line", f"{found[0].line_error_px:.1f} and {found[1].line_error_px:.1f} pixels (rms) from the true wall",
-                  "a straight line knows nothing of the music in between. We fill in too, and flag it; the smoother does not believe it"),
+            Claim(
+                "7, fig. 7a",
+                "nearly half of the groove walls in this image is missing",
+                f"{percent(CHIP_TO - CHIP_FROM)} of the inner wall",
+            ),
+            Claim(
+                "7, fig. 7b",
+                "some vertical stripes caused by the damage",
+                f"{percent(columns_set_aside(reading), 1)} of the columns hold so many points outside the "
+                "regions that they are set aside",
+                "setting them aside is ours: where a vertical stripe crosses a region it pulls the centroid",
+            ),
+            Claim(
+                "7, fig. 7c",
+                "the Hough transform segments the lines, ignoring the vertical stripes",
+                f"{sum(line is not None for line in reading.segments[0].lines)} lines",
+                "a vertical stripe has θ near 90°, outside of ± 45°: no line can collect its votes",
+            ),
+            Claim(
+                "7, fig. 7d",
+                "missing parts are filled in using the line",
+                f"{found[0].line_error_px:.1f} and {found[1].line_error_px:.1f} pixels (rms) from the true wall",
+                "a straight line knows nothing of the music in between. We fill in too, and flag it; the "
+                "smoother does not believe it",
+            ),
         ]
-    )  # fmt: skip
+    )
     page.head("What is measured in the gap, and what is believed")
     page.table(
-        ("stripe", "columns measured, outside the chip", "inside", "centroids, error outside (px rms)", "inside", "line, error inside (px rms)"),
+        (
+            "stripe",
+            "columns measured, outside the chip",
+            "inside",
+            "centroids, error outside (px rms)",
+            "inside",
+            "line, error inside (px rms)",
+        ),
         [
-            (str(number + 1), percent(g.measured_outside), percent(g.measured_inside), f"{g.error_outside_px:.1f}",
-             "–" if np.isnan(g.centroid_error_px) else f"{g.centroid_error_px:.1f}", f"{g.line_error_px:.1f}")
+            (
+                str(number + 1),
+                percent(g.measured_outside),
+                percent(g.measured_inside),
+                f"{g.error_outside_px:.1f}",
+                "–" if np.isnan(g.centroid_error_px) else f"{g.centroid_error_px:.1f}",
+                f"{g.line_error_px:.1f}",
+            )
             for number, g in zip(reading.kept, found, strict=True)
         ],
-    )  # fmt: skip
-    page.say(f"""In the chip {percent(filled)} of the samples of the wall rest on too few centroids: they take the slope of the line, are flagged
-        `SPARSE | INTERPOLATED`, and get an error bar as large as music. {_rest(filled, error, sigma)} The same
-        stretch of the same groove without the chip errs by {whole[1]:.4f} (claimed: {whole[2]:.4f}), and {percent(whole[0])} of it is filled in.
-        So the gap is *bridged*, as in the paper, but nothing that was guessed passes for a measurement: see [Kalman](kalman.md) for what the smoother makes of it.""")
+    )
+    page.say(f"""In the chip {percent(filled)} of the samples of the wall rest on too few centroids: they take the
+        slope of the line, are flagged `SPARSE | INTERPOLATED`, and get an error bar as large as music.
+        {_rest(filled, error, sigma)} The same stretch of the same groove without the chip errs by {whole[1]:.4f}
+        (claimed: {whole[2]:.4f}), and {percent(whole[0])} of it is filled in. So the gap is *bridged*, as in the
+        paper, but nothing that was guessed passes for a measurement: see [Kalman](kalman.md) for what the smoother
+        makes of it.""")
     page.write()
     return page
 
@@ -188,7 +230,8 @@ def _rest(filled: float, error: float, sigma: float) -> str:
     if filled >= 1:
         return "Nothing in it counts as measured."
     return (
-        f"The rest, where enough points of the broken surface happen to be sharp near the line, errs by {error:.4f} in slope (rms) "
+        "The rest, where enough points of the broken surface happen to be sharp near the line, errs "
+        f"by {error:.4f} in slope (rms) "
         f"and claims {sigma:.4f}."
     )
 

@@ -94,7 +94,9 @@ def noiseless_centroid_rms_px() -> float:
     take = film(LEVEL_M_S)
     quiet = replace(take.scene, noise=SensorNoise(full_well_electrons=1e9, read_electrons=0.0))
     take = film_in_memory(sound(), NOISE_RATE_HZ, quiet, [FIRST])
-    reading = replace(load_recipe("seed-paper").pickup_for(quiet.bench), hough=straight_search()).inspect(take.groups[0])
+    reading = replace(load_recipe("seed-paper").pickup_for(quiet.bench), hough=straight_search()).inspect(
+        take.groups[0]
+    )
     assert reading is not None
     return stripes_found(take, reading)[1].centroid_rms_px
 
@@ -147,40 +149,76 @@ def make(folder: Path = FOLDER) -> Page:
     quiet = noiseless_centroid_rms_px()
     page = Page("hough", "The Hough transform and the two regions (section 5.2, figure 5c–d)", folder=folder)
     page.finding = (
-        f"Three peaks, as in the paper, each within {max(abs(f.row_error_px) for f in found):.1f} pixels of its stripe; the two kept stripes lie "
+        f"Three peaks, as in the paper, each within {max(abs(f.row_error_px) for f in found):.1f} "
+        "pixels of its stripe; the two kept stripes lie "
         f"{apart_px:.1f} pixels apart where a 45° wall and the glass make {expected_px:.1f}."
     )
-    page.say("""Points with flow lie along stripes, and stripes are nearly straight, so the paper lets every point vote for all lines
-        x cos θ + y sin θ = ρ through it. With θ between −45° and 45° the lines are those that run more or less along the columns,
-        provided that **x is the row and y the column**: the paper does not say so, but with x along the groove its stripes would
-        have θ near 90° and lie outside the accumulator. The picture is the frame of [in focus](in_focus.md).""")
-    page.picture(hough_figure(reading, search), "lines", """Accumulator (square root of the votes) with its three peaks, and the
-        points of the regions; compare figures 5c and 5d of the paper. Grey: stripe 1, set aside. Orange and blue: the two stripes that make the
-        wall, with their centroid lines in black. Red: points in no region, or disputed. Violet: columns filled in from the line.""")
+    page.say("""Points with flow lie along stripes, and stripes are nearly straight, so the paper lets every point
+        vote for all lines x cos θ + y sin θ = ρ through it. With θ between −45° and 45° the lines are those that run
+        more or less along the columns, provided that **x is the row and y the column**: the paper does not say so,
+        but with x along the groove its stripes would have θ near 90° and lie outside the accumulator. The picture is
+        the frame of [in focus](in_focus.md).""")
+    page.picture(
+        hough_figure(reading, search),
+        "lines",
+        """Accumulator (square root of the votes) with its three peaks, and the points of the regions; compare figures
+        5c and 5d of the paper. Grey: stripe 1, set aside. Orange and blue: the two stripes that make the wall, with
+        their centroid lines in black. Red: points in no region, or disputed. Violet: columns filled in from the line.""",
+    )
     page.claims(_claims(reading, found, share, search))
     page.head("What was found, against what is there")
     page.table(
-        ("line", "θ (°)", "ρ (px)", "votes", "row, error in the middle (px)", "slope", "slope of the true stripe", "points", "centroids, rms error (px)", "filled in"),
+        (
+            "line",
+            "θ (°)",
+            "ρ (px)",
+            "votes",
+            "row, error in the middle (px)",
+            "slope",
+            "slope of the true stripe",
+            "points",
+            "centroids, rms error (px)",
+            "filled in",
+        ),
         [
-            (ROLES[i], f"{f.theta_deg:+.0f}", f"{f.rho_px:+.0f}", f"{f.votes:.0f}", f"{f.row_error_px:+.2f}", f"{f.slope:+.4f}",
-             f"{f.true_slope:+.4f}", str(f.points), f"{f.centroid_rms_px:.2f}", percent(f.filled_share, 1))
+            (
+                ROLES[i],
+                f"{f.theta_deg:+.0f}",
+                f"{f.rho_px:+.0f}",
+                f"{f.votes:.0f}",
+                f"{f.row_error_px:+.2f}",
+                f"{f.slope:+.4f}",
+                f"{f.true_slope:+.4f}",
+                str(f.points),
+                f"{f.centroid_rms_px:.2f}",
+                percent(f.filled_share, 1),
+            )
             for i, f in enumerate(found)
         ],
-    )  # fmt: skip
-    page.say(f"""A step of 1° is a step of {np.tan(np.deg2rad(1)):.4f} in slope, and the music swings between about ± {1.5 * LEVEL_M_S / 0.939:.2f}: the
-        transform finds *which points belong together*, it does not measure the sound. That is done by the centroids of each
-        column and the planes through them ([orientation](orientation.md)). A centroid errs by {found[1].centroid_rms_px:.1f} pixels
-        ({found[1].centroid_rms_px * 0.390625:.2f} µm) because the grains of a stripe are few and random: with a camera without noise it
-        would still err by {quiet:.1f} pixels.
+    )
+    page.say(f"""A step of 1° is a step of {np.tan(np.deg2rad(1)):.4f} in slope, and the music swings between about ±
+        {1.5 * LEVEL_M_S / 0.939:.2f}: the transform finds *which points belong together*, it does not measure the
+        sound. That is done by the centroids of each column and the planes through them
+        ([orientation](orientation.md)). A centroid errs by {found[1].centroid_rms_px:.1f} pixels
+        ({found[1].centroid_rms_px * 0.390625:.2f} µm) because the grains of a stripe are few and random: with a
+        camera without noise it would still err by {quiet:.1f} pixels.
 
         The stripes kept lie {apart_px:.1f} pixels apart; the glass and a 45° wall make {expected_px:.1f}. The search
         believes any distance within 15 % of that; the rest is measured.""")
     page.head("Straight across half a millimetre?")
-    page.say(f"""Half a millimetre of groove is half a millisecond: half a turn of a 1 kHz tone. A loud passage is no straight line across the
-        picture any more, and its points leave the box of one peak. The recipe therefore cuts the picture into 4 stretches of
-        columns with a transform each, our one departure from section 5.2. {GROUPS} groups each, the second passage {LOUD:g} times
-        as loud as an ordinary one; what is filled in does not count in the error:""")
-    _segments_table(page, pickup, {"ordinary (3 cm/s rms)": take, f"loud ({100 * LOUD * LEVEL_M_S:.0f} cm/s rms)": film(LOUD * LEVEL_M_S, GROUPS)})
+    page.say(f"""Half a millimetre of groove is half a millisecond: half a turn of a 1 kHz tone. A loud passage is no
+        straight line across the picture any more, and its points leave the box of one peak. The recipe therefore cuts
+        the picture into 4 stretches of columns with a transform each, our one departure from section 5.2. {GROUPS}
+        groups each, the second passage {LOUD:g} times as loud as an ordinary one; what is filled in does not count in
+        the error:""")
+    _segments_table(
+        page,
+        pickup,
+        {
+            "ordinary (3 cm/s rms)": take,
+            f"loud ({100 * LOUD * LEVEL_M_S:.0f} cm/s rms)": film(LOUD * LEVEL_M_S, GROUPS),
+        },
+    )
     page.write()
     return page
 
@@ -189,14 +227,30 @@ def _claims(reading: Reading, found: list[StripeFound], share: list[float], sear
     steps = np.rad2deg(search.theta_rad)
     return [
         Claim("5.2", "θ from −45° to 45° in steps of 1°", f"{steps[0]:.0f}° … {steps[-1]:.0f}°, {steps.size} angles"),
-        Claim("5.2", "three global peaks are three lines", f"{len(found)} lines; votes {', '.join(f'{f.votes:.0f}' for f in found)}"),
-        Claim("5.2", "a point in one and only one region belongs to it; one in several is discarded",
-              f"{percent(share[1], 1)} disputed, {percent(share[0], 1)} in no region",
-              "the paper gives no size of the region; ours is ± 1.5°, ± 9 pixels"),
-        Claim("5.2", "the top stripe is discarded", f"stripe 1 is set aside, {', '.join(str(k + 1) for k in reading.kept)} are kept"),
-        Claim("5.2", "void sections are filled from the peak's line", f"{percent(found[1].filled_share, 1)} and {percent(found[2].filled_share, 1)} of the columns",
-              "filled columns are flagged and take no part in the fit: a straight line has the wrong slope wherever there is music"),
-    ]  # fmt: skip
+        Claim(
+            "5.2",
+            "three global peaks are three lines",
+            f"{len(found)} lines; votes {', '.join(f'{f.votes:.0f}' for f in found)}",
+        ),
+        Claim(
+            "5.2",
+            "a point in one and only one region belongs to it; one in several is discarded",
+            f"{percent(share[1], 1)} disputed, {percent(share[0], 1)} in no region",
+            "the paper gives no size of the region; ours is ± 1.5°, ± 9 pixels",
+        ),
+        Claim(
+            "5.2",
+            "the top stripe is discarded",
+            f"stripe 1 is set aside, {', '.join(str(k + 1) for k in reading.kept)} are kept",
+        ),
+        Claim(
+            "5.2",
+            "void sections are filled from the peak's line",
+            f"{percent(found[1].filled_share, 1)} and {percent(found[2].filled_share, 1)} of the columns",
+            "filled columns are flagged and take no part in the fit: a straight line has the wrong slope "
+            "wherever there is music",
+        ),
+    ]
 
 
 if __name__ == "__main__":

@@ -29,7 +29,15 @@ SHARP_REACH_PX = 8.0
 """Points so near to the true line of a stripe count as inside a sharp zone: the blur is then under seven pixels."""
 LAID_SHORT = 0.2
 """In the second test the frames are laid so much too closely on each other: a small, exactly known flow remains."""
-WEIGHTS = ((0.5, 0.0, 0.0), (0.5, 0.5, 0.0), (0.5, 0.0, 0.5), (0.5, 0.5, 0.5), (0.5, 2.0, 2.0), (0.1, 0.1, 0.1), (2.0, 2.0, 2.0))
+WEIGHTS = (
+    (0.5, 0.0, 0.0),
+    (0.5, 0.5, 0.0),
+    (0.5, 0.0, 0.5),
+    (0.5, 0.5, 0.5),
+    (0.5, 2.0, 2.0),
+    (0.1, 0.1, 0.1),
+    (2.0, 2.0, 2.0),
+)
 
 
 @dataclass(frozen=True)
@@ -93,14 +101,14 @@ def cases(group: FrameGroup) -> list[Case]:
         Case("laid a fifth too short", group_derivatives(short, smoothing_px=1.0), -LAID_SHORT * step_px),
         Case("registered", group_derivatives(right, smoothing_px=1.0), 0.0),
     ]
-    return [replace(case, derivatives=case.derivatives.scaled(1 / texture_contrast(case.derivatives.x))) for case in raw]
+    return [
+        replace(case, derivatives=case.derivatives.scaled(1 / texture_contrast(case.derivatives.x))) for case in raw
+    ]
 
 
 def _solve(pickup: SeedPaperPickup, case: Case, weights: tuple[float, float, float], step_m: float) -> Flow:
     alpha, beta, gamma = weights
-    method = (
-        GrooveHornSchunck(alpha=alpha, beta=beta, gamma=gamma) if beta or gamma else HornSchunck(alpha=alpha)
-    )
+    method = GrooveHornSchunck(alpha=alpha, beta=beta, gamma=gamma) if beta or gamma else HornSchunck(alpha=alpha)
     return replace(pickup, flow=method)._flow(case.derivatives, np.array([step_m]))
 
 
@@ -200,30 +208,32 @@ def _explain(page: Page, take: Take) -> None:
     step_px = bench.sequence.frame_step_m / bench.sensor.pixel_pitch_m
     shear = step_px * np.tan(bench.disc.wall_angle_rad) * bench.sensor.pixel_pitch_m / bench.objective.object_distance_m
     page.head("The constraint, derived")
-    page.say("""The paper says that its constraint "regulates the distribution of horizontal optical flow along the vertical
-        direction since it is known that one of the angles defining wall orientation is 45°", and prints no equation. This is ours.
-        The record is a rigid body that slides past a lens at the distance Z. A point at the depth q below the sharp plane
-        therefore moves with u = U (1 − q/Z) along the groove, and not at all across it. On a wall that stands at the angle φ, depth
-        changes by tan φ for each unit across the groove, so the rate at which flow changes down the rows is known beforehand.
-        Horn and Schunck's energy becomes""")
+    page.say("""The paper says that its constraint "regulates the distribution of horizontal optical flow along the
+        vertical direction since it is known that one of the angles defining wall orientation is 45°", and prints no
+        equation. This is ours. The record is a rigid body that slides past a lens at the distance Z. A point at the
+        depth q below the sharp plane therefore moves with u = U (1 − q/Z) along the groove, and not at all across it.
+        On a wall that stands at the angle φ, depth changes by tan φ for each unit across the groove, so the rate at
+        which flow changes down the rows is known beforehand. Horn and Schunck's energy becomes""")
     page.verbatim(ENERGY)
-    page.say(f"""β carries what is known of u up and down a wall; γ says that texture does not wander across the groove. The Jacobi
-        sweep stays in closed form; the derivation, discretisation included, is the docstring of
-        [`pickup/flow/horn_schunck.py`](../../../src/gramoscope/pickup/flow/horn_schunck.py), and a test holds the sweep to the
-        energy. How large is g? At {step_px:.2f} pixels a frame and 4 mm distance it is {1e4 * shear:.1f} · 10⁻⁴ pixels a frame for each row,
-        {100 * shear:.3f} over a hundred rows: the 45° of the walls are *visible* in the flow, but at two per cent of a
-        pixel they are far too faint to be measured with it. The stripes, not the flow, give the depth. (The simulator films the record
-        from far away, without perspective: its exact flow has no g at all.)""")
+    page.say(f"""β carries what is known of u up and down a wall; γ says that texture does not wander across the
+        groove. The Jacobi sweep stays in closed form; the derivation, discretisation included, is the docstring of
+        [`pickup/flow/horn_schunck.py`](../../../src/gramoscope/pickup/flow/horn_schunck.py), and a test holds the
+        sweep to the energy. How large is g? At {step_px:.2f} pixels a frame and 4 mm distance it is {1e4 * shear:.1f}
+        · 10⁻⁴ pixels a frame for each row, {100 * shear:.3f} over a hundred rows: the 45° of the walls are *visible*
+        in the flow, but at two per cent of a pixel they are far too faint to be measured with it. The stripes, not
+        the flow, give the depth. (The simulator films the record from far away, without perspective: its exact flow
+        has no g at all.)""")
 
 
 def _tell_of_places(page: Page, clean: Places, dirty: Places) -> None:
     page.head("Does flow find the sharp places?")
-    page.say(f"""The recipe marks a point when its gradient along the groove is strong and its flow is that of the record. On this
-        frame {clean.count} points are marked, {percent(clean.far_share, 2)} of them more than 15 pixels from the nearest
-        true stripe. Leave the test of the flow out, and {clean.without_flow} are marked; with thirty specks of dirt on the camera's window,
-        {dirty.count} with the test and {dirty.without_flow} without. In other words the *gradient* does the work, as the paper
-        half says ("out-of-focus regions tended to be heavily blurred with intensity derivatives near zero"). What the
-        flow is truly needed for here is to lay the frames of a group and the groups of a passage on each other.""")
+    page.say(f"""The recipe marks a point when its gradient along the groove is strong and its flow is that of the
+        record. On this frame {clean.count} points are marked, {percent(clean.far_share, 2)} of them more than 15
+        pixels from the nearest true stripe. Leave the test of the flow out, and {clean.without_flow} are marked; with
+        thirty specks of dirt on the camera's window, {dirty.count} with the test and {dirty.without_flow} without. In
+        other words the *gradient* does the work, as the paper half says ("out-of-focus regions tended to be heavily
+        blurred with intensity derivatives near zero"). What the flow is truly needed for here is to lay the frames of
+        a group and the groups of a passage on each other.""")
 
 
 def _verdict(errors: Errors) -> str:
@@ -231,13 +241,13 @@ def _verdict(errors: Errors) -> str:
         off, beta, gamma, both = (errors[name, weights].angle_deg for weights in WEIGHTS[:4])
         return f"{off:.2f}° without, {beta:.2f}° with β alone, {gamma:.2f}° with γ alone, {both:.2f}° with both"
 
-    return f"""Raw frames: {angles("raw frames")}. What remains when they are laid a fifth too short: {angles("laid a fifth too short")}.
-        Most of the gain is γ, which all but removes one of two unknowns. β adds smoothing up and down a wall, and a sharp stripe is only
-        some sixteen rows high: where the flow is large, what is carried in comes from rows that know nothing, and β does harm;
-        where little motion remains, which is how the recipe uses it, the two together are best. Outside the
-        sharp zones no weight rescues the flow: where the gradient vanishes the energy is all prior, and a hundred sweeps from
-        zero end near zero. Large weights win on registered frames for the same reason: the exact flow is zero there, and
-        a prior that says so cannot lose."""
+    return f"""Raw frames: {angles("raw frames")}. What remains when they are laid a fifth too short:
+        {angles("laid a fifth too short")}. Most of the gain is γ, which all but removes one of two unknowns. β adds
+        smoothing up and down a wall, and a sharp stripe is only some sixteen rows high: where the flow is large, what
+        is carried in comes from rows that know nothing, and β does harm; where little motion remains, which is how
+        the recipe uses it, the two together are best. Outside the sharp zones no weight rescues the flow: where the
+        gradient vanishes the energy is all prior, and a hundred sweeps from zero end near zero. Large weights win on
+        registered frames for the same reason: the exact flow is zero there, and a prior that says so cannot lose."""
 
 
 def make(folder: Path = FOLDER) -> Page:
@@ -248,7 +258,9 @@ def make(folder: Path = FOLDER) -> Page:
     assert reading is not None
     errors = flow_errors(take, pickup)
     soiled = replace(take.scene, rig=Rig(dirt=30))
-    dirty_take = film_in_memory(noise_sound(low_hz=200, high_hz=4000, seconds=0.1, seed=SEED), NOISE_RATE_HZ, soiled, [GROUP])
+    dirty_take = film_in_memory(
+        noise_sound(low_hz=200, high_hz=4000, seconds=0.1, seed=SEED), NOISE_RATE_HZ, soiled, [GROUP]
+    )
     clean, dirty = marked_places(take, pickup), marked_places(dirty_take, pickup)
     off, on = errors["raw frames", (0.5, 0.0, 0.0)], errors["raw frames", (0.5, 0.5, 0.5)]
     page = Page("in_focus", "Optical flow and in-focus regions (section 5.1, figure 5a–b)", folder=folder)
@@ -256,33 +268,67 @@ def make(folder: Path = FOLDER) -> Page:
         f"The groove-orientation constraint lowers the angular error on raw frames from {off.angle_deg:.2f}° to "
         f"{on.angle_deg:.2f}° inside the sharp zones; what finds the stripes is the gradient, not the flow."
     )
-    page.say(f"""One group of {FRAMES} frames of a simulated groove (texture of powder as in the paper's earlier work, about 1 µm; noise
-        between 200 Hz and 4 kHz cut at 3 cm/s). Since the groove is simulated, its flow is known exactly: in raw frames the record
-        moves by {-cases(take.groups[0])[0].flow_px:.3f} pixels from frame to frame at every point, sharp or not.""")
-    page.picture(places_figure(take, reading), "places", """A frame, and the places where flow was found; compare figures 5a and 5b
-        of the paper. Yellow: ± 8 pixels about where the walls truly cross the sharp planes. Each dot is drawn two pixels large.""")
+    page.say(f"""One group of {FRAMES} frames of a simulated groove (texture of powder as in the paper's earlier work,
+        about 1 µm; noise between 200 Hz and 4 kHz cut at 3 cm/s). Since the groove is simulated, its flow is known
+        exactly: in raw frames the record moves by {-cases(take.groups[0])[0].flow_px:.3f} pixels from frame to frame
+        at every point, sharp or not.""")
+    page.picture(
+        places_figure(take, reading),
+        "places",
+        """A frame, and the places where flow was found; compare figures 5a and 5b of the paper. Yellow: ± 8 pixels
+        about where the walls truly cross the sharp planes. Each dot is drawn two pixels large.""",
+    )
     page.claims(
         [
-            Claim("4, 5", "three in-focus stripes, two of one depth on opposite walls", f"{len(reading.stripes)} stripes, found"),
-            Claim("5.1", "flow marks the places in focus", f"{percent(1 - clean.far_share, 2)} of {clean.count} points lie within 15 pixels of a true stripe",
-                  "the paper has no truth to count against"),
-            Claim("5.1", "a groove-orientation constraint regulates the flow",
-                  f"angular error inside the sharp zones {off.angle_deg:.2f}° without, {on.angle_deg:.2f}° with it (raw frames)",
-                  "the paper prints neither equation nor figure; the constraint is ours"),
+            Claim(
+                "4, 5",
+                "three in-focus stripes, two of one depth on opposite walls",
+                f"{len(reading.stripes)} stripes, found",
+            ),
+            Claim(
+                "5.1",
+                "flow marks the places in focus",
+                f"{percent(1 - clean.far_share, 2)} of {clean.count} points lie within 15 pixels of a true stripe",
+                "the paper has no truth to count against",
+            ),
+            Claim(
+                "5.1",
+                "a groove-orientation constraint regulates the flow",
+                f"angular error inside the sharp zones {off.angle_deg:.2f}° without, {on.angle_deg:.2f}° with "
+                "it (raw frames)",
+                "the paper prints neither equation nor figure; the constraint is ours",
+            ),
             Claim("7", "12 images a group", f"{FRAMES}"),
         ]
-    )  # fmt: skip
+    )
     _explain(page, take)
     page.head("What it does to the flow")
-    page.say(f"""All weights are in units of the sharpest region's gradient, with 100 sweeps. *Raw frames*: Gaussian of one pixel in
-        space and one frame in time, four-point differences, exact flow {cases(take.groups[0])[0].flow_px:.3f} pixels a frame. *Laid a fifth too
-        short*: the frames are laid over each other with {percent(LAID_SHORT)} too short steps, so that
-        {cases(take.groups[0])[1].flow_px:.3f} pixels remain. *Registered*: as the recipe does it, exact flow zero. Errors are the angle
-        between (u, v, 1) and the exact one, as Barron, Fleet and Beauchemin measure it, and the end-point error in pixels a
-        frame; mean ± spread. The shipped weights are ½, ½, ½.""")
-    page.picture(error_figure(errors), "errors", """Angular error inside the sharp zones by the weights α, β, γ. The first row is plain Horn
-        and Schunck, the blue one is what we ship.""")
-    page.table(("frames", "α", "β", "γ", "sharp: angle (°)", "sharp: end point (px)", "blurred: angle (°)", "blurred: end point (px)"), _rows(errors))
+    page.say(f"""All weights are in units of the sharpest region's gradient, with 100 sweeps. *Raw frames*: Gaussian
+        of one pixel in space and one frame in time, four-point differences, exact flow
+        {cases(take.groups[0])[0].flow_px:.3f} pixels a frame. *Laid a fifth too short*: the frames are laid over each
+        other with {percent(LAID_SHORT)} too short steps, so that {cases(take.groups[0])[1].flow_px:.3f} pixels
+        remain. *Registered*: as the recipe does it, exact flow zero. Errors are the angle between (u, v, 1) and the
+        exact one, as Barron, Fleet and Beauchemin measure it, and the end-point error in pixels a frame; mean ±
+        spread. The shipped weights are ½, ½, ½.""")
+    page.picture(
+        error_figure(errors),
+        "errors",
+        """Angular error inside the sharp zones by the weights α, β, γ. The first row is plain Horn
+        and Schunck, the blue one is what we ship.""",
+    )
+    page.table(
+        (
+            "frames",
+            "α",
+            "β",
+            "γ",
+            "sharp: angle (°)",
+            "sharp: end point (px)",
+            "blurred: angle (°)",
+            "blurred: end point (px)",
+        ),
+        _rows(errors),
+    )
     page.say(_verdict(errors))
     _tell_of_places(page, clean, dirty)
     page.write()

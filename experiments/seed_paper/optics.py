@@ -111,7 +111,8 @@ def claims(n: Numbers) -> list[Claim]:
         Claim(
             "2",
             "78RPM records need less magnification than 33RPM ones",
-            f"at 33⅓ the same sound is squeezed into a {78 / (100 / 3):.2f} times shorter groove, which needs so much more "
+            f"at 33⅓ the same sound is squeezed into a {78 / (100 / 3):.2f} times shorter groove, which "
+            "needs so much more "
             "magnification",
             "the paper gives no number",
         ),
@@ -119,7 +120,8 @@ def claims(n: Numbers) -> list[Claim]:
             "3",
             "groove about 120 µm deep, error 7–8 % of the distance: distance ≤ 1.7mm",
             f"{GROOVE_DEPTH_M / 0.08 * mm:.2f} … {GROOVE_DEPTH_M / 0.07 * mm:.2f} mm",
-            f"1.7 mm belongs to 7 %; 8 % gives 1.5 mm. A V with 45° walls that is 120 µm deep is {2 * GROOVE_DEPTH_M * um:.0f} µm "
+            "1.7 mm belongs to 7 %; 8 % gives 1.5 mm. A V with 45° walls that is 120 µm deep is "
+            f"{2 * GROOVE_DEPTH_M * um:.0f} µm "
             f"wide; the bench here has {Bench().disc.groove_width_m * um:.0f} µm, and is therefore "
             f"{Bench().disc.groove_width_m / 2 * um:.0f} µm deep",
         ),
@@ -135,7 +137,8 @@ def claims(n: Numbers) -> list[Claim]:
             "4",
             "depth of field of a 4X objective about 45 µm",
             f"{n.depth_of_field_4x_m * um:.0f} µm for NA 0.10",
-            f"45 µm belongs to NA {n.aperture_of_45_um:.2f}; it is {percent(45e-6 / GROOVE_DEPTH_M)} of the groove, where the "
+            f"45 µm belongs to NA {n.aperture_of_45_um:.2f}; it is {percent(45e-6 / GROOVE_DEPTH_M)} of "
+            "the groove, where the "
             "paper says about half",
         ),
         Claim("4", "f = 32mm of the 4X objective", f"{n.focal_length_4x_m * mm:.0f} mm"),
@@ -150,7 +153,8 @@ def claims(n: Numbers) -> list[Claim]:
             "5",
             "cos θ/cos θ′ is close to 1 below 22.5°",
             f"{n.cosines_at_limit:.3f} at 22.5°, where the shift is {n.shift_at_limit_m * um:.2f} µm",
-            f"that is {percent(n.shift_at_limit_m / n.shift_m - 1)} more than equation 3, and a 0.65 aperture goes on to "
+            f"that is {percent(n.shift_at_limit_m / n.shift_m - 1)} more than equation 3, and a 0.65 "
+            "aperture goes on to "
             f"{deg(LENS.half_angle_rad):.1f}°, where it is {n.shift_at_rim_m * um:.1f} µm",
         ),
         Claim(
@@ -179,7 +183,8 @@ def claims(n: Numbers) -> list[Claim]:
             "7",
             "6000 groups: about 3 seconds",
             f"{n.seconds:.2f} s without overlap",
-            f"an overlap of {percent(n.overlap_for_3_s, 1)} between groups would make it 3 s; the paper says nothing of overlap",
+            f"an overlap of {percent(n.overlap_for_3_s, 1)} between groups would make it 3 s; the paper "
+            "says nothing of overlap",
         ),
         Claim(
             "7",
@@ -190,7 +195,8 @@ def claims(n: Numbers) -> list[Claim]:
         Claim(
             "6",
             "neighbourhood of 100 pixels",
-            f"{NEIGHBOURHOOD_PX * n.pixel_pitch_m * um:.1f} µm, {NEIGHBOURHOOD_PX / n.pixel_rate_hz * um:.1f} µs of sound",
+            f"{NEIGHBOURHOOD_PX * n.pixel_pitch_m * um:.1f} µm, "
+            f"{NEIGHBOURHOOD_PX / n.pixel_rate_hz * um:.1f} µs of sound",
             "see [orientation](orientation.md) for what that does to treble and noise",
         ),
     ]
@@ -207,10 +213,20 @@ def shift_figure(n: Numbers) -> Figure:
     axes.axhline(n.shift_mean_m * 1e6, color=ink.GREY, linestyle=":", linewidth=1.5)
     axes.axvline(PARAXIAL_LIMIT_DEG, color=ink.GREY, linewidth=1)
     axes.text(33.5, 44.2, "exact: equation 2 with its d", color=ink.BLUE, fontsize=ink.SMALL, va="top")
-    axes.text(41, n.shift_m * 1e6 - 0.2, "paraxial: equation 3", color=ink.VERMILLION, fontsize=ink.SMALL, va="top", ha="right")
+    axes.text(
+        41,
+        n.shift_m * 1e6 - 0.2,
+        "paraxial: equation 3",
+        color=ink.VERMILLION,
+        fontsize=ink.SMALL,
+        va="top",
+        ha="right",
+    )
     axes.text(1, n.shift_mean_m * 1e6 + 0.15, "mean over the light of the cone", color=ink.BLACK, fontsize=ink.SMALL)
     axes.text(PARAXIAL_LIMIT_DEG + 0.4, 47.5, "22.5°, the paper's limit", color=ink.BLACK, fontsize=ink.SMALL)
-    ink.dress(axes, x="angle of the ray in air, θ (degrees; the aperture ends at 40.5)", y="shift of the focus, δv (µm)")
+    ink.dress(
+        axes, x="angle of the ray in air, θ (degrees; the aperture ends at 40.5)", y="shift of the focus, δv (µm)"
+    )
     axes.set_xlim(0, 41.2)
     axes.set_ylim(36, 50)
     return figure
@@ -269,40 +285,47 @@ def make(folder: Path = FOLDER) -> Page:
     n, bench = numbers(), Bench()
     page = Page("optics", "The rig and its optics (sections 2 to 5, arithmetic of 7)", folder=folder)
     page.finding = (
-        f"All printed numbers are confirmed but for rounding; equation 2 lacks its factor d, and at the rim of the aperture the "
+        "All printed numbers are confirmed but for rounding; equation 2 lacks its factor d, and at "
+        "the rim of the aperture the "
         f"glass shifts the focus by {n.shift_at_rim_m * 1e6:.1f} µm where the paper counts on {n.shift_m * 1e6:.1f}."
     )
-    page.say(f"""{PAPER}. A microscope with a 40X objective looks down into the groove of a 78 while the turntable creeps.
-        The lens is sharp over about a micrometre of depth only, and the groove is a hundred times deeper. The paper makes a
-        virtue of it: where a wall at 45° crosses the sharp plane there is a sharp *stripe*, and with a thin glass over half of
-        the field there are two sharp planes, hence two stripes at known depths on one wall, hence that wall's orientation.""")
+    page.say(f"""{PAPER}. A microscope with a 40X objective looks down into the groove of a 78 while the turntable
+        creeps. The lens is sharp over about a micrometre of depth only, and the groove is a hundred times deeper. The
+        paper makes a virtue of it: where a wall at 45° crosses the sharp plane there is a sharp *stripe*, and with a
+        thin glass over half of the field there are two sharp planes, hence two stripes at known depths on one wall,
+        hence that wall's orientation.""")
     page.claims(claims(n))
     page.head("Why the glass moves the focus, and by how much")
-    page.say(f"""A plane plate of thickness d lets a ray of angle θ cross the axis further away from the lens by d − d·tan θ′/tan θ
-        with sin θ = λ sin θ′. Writing the tangents out gives the paper's equation 2, *with* the d. The ratio
-        cos θ/cos θ′ is 1 on the axis only, and falls as the ray gets steeper: the plate adds spherical aberration. The rays of
-        the cone do not meet in one point any more but are spread over {(n.shift_at_rim_m - n.shift_m) * 1e6:.1f} µm of depth,
-        {(n.shift_at_rim_m - n.shift_m) / n.depth_of_field_m:.0f} times the depth of field. Their mean, weighted by light, lies
-        at {n.shift_mean_m * 1e6:.1f} µm. (An objective corrected for cover glasses behaves otherwise; the paper names none.)
+    page.say(f"""A plane plate of thickness d lets a ray of angle θ cross the axis further away from the lens by d −
+        d·tan θ′/tan θ with sin θ = λ sin θ′. Writing the tangents out gives the paper's equation 2, *with* the d. The
+        ratio cos θ/cos θ′ is 1 on the axis only, and falls as the ray gets steeper: the plate adds spherical
+        aberration. The rays of the cone do not meet in one point any more but are spread over
+        {(n.shift_at_rim_m - n.shift_m) * 1e6:.1f} µm of depth,
+        {(n.shift_at_rim_m - n.shift_m) / n.depth_of_field_m:.0f} times the depth of field. Their mean, weighted by
+        light, lies at {n.shift_mean_m * 1e6:.1f} µm. (An objective corrected for cover glasses behaves otherwise; the
+        paper names none.)
 
-        The shift sets the wall's angle that is computed, not the sound: what is heard is the slope of a stripe along the
-        groove, and that does not depend on the shift. But the distance of two stripes of a 45° wall does:
-        {n.separation_px:.1f} pixels for {n.shift_m * 1e6:.2f} µm. That is a free check of the glass; measured in a real picture
-        it is a calibration (`CoverGlass.focus_shift_m`).""")
+        The shift sets the wall's angle that is computed, not the sound: what is heard is the slope of a stripe along
+        the groove, and that does not depend on the shift. But the distance of two stripes of a 45° wall does:
+        {n.separation_px:.1f} pixels for {n.shift_m * 1e6:.2f} µm. That is a free check of the glass; measured in a
+        real picture it is a calibration (`CoverGlass.focus_shift_m`).""")
     page.picture(
         shift_figure(n),
         "shift",
-        "Shift of the focus by 0.11 mm of glass. The paper's constant is the value at θ = 0; the aperture of a 40X/0.65 ends at "
+        "Shift of the focus by 0.11 mm of glass. The paper's constant is the value at θ = 0; the "
+        "aperture of a 40X/0.65 ends at "
         f"{deg(LENS.half_angle_rad):.1f}°.",
     )
     page.head("Two sharp depths, three sharp stripes")
-    page.say(f"""Depths are counted here from the land, with the plane that is sharp without glass {bench.focus_below_land_m * 1e6:.0f} µm
-        below it (the paper does not say where it focused). Stripes 1 and 2 lie at the same depth on opposite walls, through the
-        glass; stripe 3 lies on the wall of stripe 2, beside the glass. The paper sets stripe 1 aside and makes the wall from 2
-        and 3. Blur grows by {LENS.blur_radius_per_defocus:.2f} µm of radius for each micrometre of defocus: a point one stripe
-        distance away from its sharp plane is smeared over a disc of
-        {float(blur_radius_m(n.shift_m, objective=LENS)) / n.pixel_pitch_m:.0f} pixels radius, and a texture of micrometre grains
-        vanishes. That is what lets a flow algorithm tell sharp from blurred: see [in focus](in_focus.md).""")
+    page.say(f"""Depths are counted here from the land, with the plane that is sharp without glass
+        {bench.focus_below_land_m * 1e6:.0f} µm below it (the paper does not say where it focused). Stripes 1 and 2
+        lie at the same depth on opposite walls, through the glass; stripe 3 lies on the wall of stripe 2, beside the
+        glass. The paper sets stripe 1 aside and makes the wall from 2 and 3. Blur grows by
+        {LENS.blur_radius_per_defocus:.2f} µm of radius for each micrometre of defocus: a point one stripe distance
+        away from its sharp plane is smeared over a disc of
+        {float(blur_radius_m(n.shift_m, objective=LENS)) / n.pixel_pitch_m:.0f} pixels radius, and a texture of
+        micrometre grains vanishes. That is what lets a flow algorithm tell sharp from blurred: see [in
+        focus](in_focus.md).""")
     page.picture(
         stripes_figure(bench),
         "stripes",

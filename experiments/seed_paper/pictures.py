@@ -16,8 +16,8 @@ from gramoscope.pickup.hough import Line
 from gramoscope.pickup.search import HoughSearch, Segment
 from gramoscope.pickup.seed_paper import Reading
 
-GREYS = colormaps["gray"].resampled(14)
-"""Few greys make small files."""
+GREYS, HEAT = colormaps["gray"].resampled(14), colormaps["magma"].resampled(16)
+"""Few colours make small files."""
 STRIPE_COLOURS = (ink.GREY, ink.ORANGE, ink.SKY)
 ROWS = (150, 450)
 """The part of a picture that is shown: the rest is out of focus."""
@@ -40,7 +40,14 @@ def _show(axes: Axes, image: FloatArray, *, vmin: float, vmax: float, rows: tupl
     height, width = image.shape
     extent = (-0.5, width - 0.5, -0.5, height - 0.5)
     axes.imshow(
-        image, cmap=GREYS, vmin=vmin, vmax=vmax, origin="lower", aspect="equal", interpolation="antialiased", extent=extent
+        image,
+        cmap=GREYS,
+        vmin=vmin,
+        vmax=vmax,
+        origin="lower",
+        aspect="equal",
+        interpolation="antialiased",
+        extent=extent,
     )
     axes.set_ylim(rows)
     ink.dress(axes, x="column, along the groove (pixels)", y="row (pixels)", grid=False)
@@ -53,16 +60,27 @@ def draw_accumulator(axes: Axes, segment: Segment, search: HoughSearch, lines: S
     shown = np.abs(rho_px) <= 260
     cells = votes.votes.T[shown].astype(np.float64)
     axes.imshow(
-        np.sqrt(cells), cmap="magma", origin="lower", aspect="auto", interpolation="nearest",
+        np.sqrt(cells),
+        cmap=HEAT,
+        origin="lower",
+        aspect="auto",
+        interpolation="nearest",
         extent=(theta_deg[0] - 0.5, theta_deg[-1] + 0.5, -260.5, 260.5),
-    )  # fmt: skip
+    )
     half_deg, half_px = search.region_theta_deg, search.region_rho_px
     for number, line in enumerate(lines):
         if line is not None:
             corner = (deg(line.theta_rad) - half_deg, line.rho_px - half_px)
             box = Rectangle(corner, 2 * half_deg, 2 * half_px, fill=False, edgecolor="white", linewidth=1.4)
             axes.add_patch(box)
-            axes.text(corner[0] + 2 * half_deg + 1.5, line.rho_px, str(number + 1), color="white", fontsize=ink.MEDIUM, va="center")
+            axes.text(
+                corner[0] + 2 * half_deg + 1.5,
+                line.rho_px,
+                str(number + 1),
+                color="white",
+                fontsize=ink.MEDIUM,
+                va="center",
+            )
     ink.dress(axes, x="θ (degrees)", y="ρ (pixels)", grid=False)
 
 
@@ -71,7 +89,9 @@ def draw_regions(axes: Axes, reading: Reading, *, rows: tuple[int, int] = ROWS) 
     for number in range(len(reading.stripes)):
         mine = reading.label == number
         size = 1.2 if number in reading.kept else 0.5
-        axes.plot(reading.point_column[mine], reading.point_row[mine], ",", color=STRIPE_COLOURS[number], markersize=size)
+        axes.plot(
+            reading.point_column[mine], reading.point_row[mine], ",", color=STRIPE_COLOURS[number], markersize=size
+        )
     lost = reading.label < 0
     axes.plot(reading.point_column[lost], reading.point_row[lost], ".", color=ink.VERMILLION, markersize=1.5)
     columns = np.arange(reading.canvas.mean.shape[1])

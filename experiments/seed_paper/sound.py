@@ -65,7 +65,9 @@ def song() -> tuple[FloatArray, float, str]:
     return samples, rate, "a synthesised singer over bells (the practice sounds are not here)"
 
 
-def _filmed(samples: FloatArray, rate_hz: float, folder: Path, *, characteristic: str | None, damage: str = "none") -> None:
+def _filmed(
+    samples: FloatArray, rate_hz: float, folder: Path, *, characteristic: str | None, damage: str = "none"
+) -> None:
     bench = filming_bench()
     disc = replace(bench.disc, characteristic=characteristic)
     height = framing_height_px(samples, rate_hz, level_m_s=LEVEL_M_S, disc=disc)
@@ -106,7 +108,10 @@ def hear_damaged(folder: Path, tell: Tell | None = None) -> tuple[Heard, str]:
     """Play the damaged practice capture, or film one."""
     capture, what = SHARED / "captures" / "practice-damaged", "the damaged practice capture, made by another renderer"
     if not capture.is_dir():
-        capture, what = folder / "damaged", "a heavily damaged groove of our simulator (the practice capture is not here)"
+        capture, what = (
+            folder / "damaged",
+            "a heavily damaged groove of our simulator (the practice capture is not here)",
+        )
         samples, rate_hz = demo_sound(seconds=SECONDS)
         _filmed(samples, rate_hz, capture, characteristic=None, damage="heavy")
     report = _played(capture, folder / "damaged-played", tell)
@@ -145,7 +150,9 @@ def waves_figure(heard: Heard) -> Figure:
     figure = ink.blank_figure(9.6, 4.6)
     panels = figure.subplots(2, 2, sharex=True, sharey="row")
     shift_s, gain = heard.found.delay_s, heard.found.polarity * 10 ** (-heard.found.gain_db / 20)
-    recovered = band_passed(heard.recovered, rate_hz=heard.rate_hz, band_hz=heard.found.band_hz, advance_s=shift_s) * gain
+    recovered = (
+        band_passed(heard.recovered, rate_hz=heard.rate_hz, band_hz=heard.found.band_hz, advance_s=shift_s) * gain
+    )
     recorded = band_passed(heard.recorded, rate_hz=heard.rate_hz, band_hz=heard.found.band_hz)
     window = max(1, round(FIGURE_WINDOW_S * heard.rate_hz))
     names = ("a  Recorded", "b  Recovered", "c  Recorded, peak envelope", "d  Recovered, peak envelope")
@@ -168,7 +175,14 @@ def octaves_figure(synthetic: Heard) -> Figure:
     octaves = synthetic.found.octave_snr_db
     axes.bar(range(len(octaves)), list(octaves.values()), color=ink.BLUE, width=0.6)
     for place, value in enumerate(octaves.values()):
-        axes.text(place, value + (0.4 if value >= 0 else -0.4), f"{value:+.1f}", ha="center", va="bottom" if value >= 0 else "top", fontsize=ink.SMALL)
+        axes.text(
+            place,
+            value + (0.4 if value >= 0 else -0.4),
+            f"{value:+.1f}",
+            ha="center",
+            va="bottom" if value >= 0 else "top",
+            fontsize=ink.SMALL,
+        )
     axes.axhline(0, color=ink.GREY, linewidth=1)
     axes.set_xticks(range(len(octaves)), [f"{centre:g}" for centre in octaves])
     axes.margins(y=0.15)
@@ -178,8 +192,15 @@ def octaves_figure(synthetic: Heard) -> Figure:
 
 def _row(name: str, found: Comparison, paper: str) -> tuple[str, ...]:
     low, high = found.band_hz
-    return (name, f"{low:.0f} … {high:.0f}", f"{1e3 * found.span_s:.0f}", f"{found.waveform_r:.3f}", f"{found.envelope_r:.3f}",
-            f"{found.snr_db:+.1f}", paper)  # fmt: skip
+    return (
+        name,
+        f"{low:.0f} … {high:.0f}",
+        f"{1e3 * found.span_s:.0f}",
+        f"{found.waveform_r:.3f}",
+        f"{found.envelope_r:.3f}",
+        f"{found.snr_db:+.1f}",
+        paper,
+    )
 
 
 def _wide(heard: Heard) -> Comparison:
@@ -187,7 +208,8 @@ def _wide(heard: Heard) -> Comparison:
 
 
 REAL = (
-    "theirs is a real record against another player's recording of it, with that player's own noise, wow and alignment; "
+    "theirs is a real record against another player's recording of it, with that player's own "
+    "noise, wow and alignment; "
     "ours is a simulated film against what was truly cut"
 )
 
@@ -199,22 +221,55 @@ def _claims(song_heard: Heard, damaged: Heard, synthetic: Heard) -> list[Claim]:
     groups_a_second = song_heard.groups / (song_heard.recorded.size / RATE_HZ)
     wide = synthetic.found
     return [
-        Claim("1", "synthetic data: useful from 200Hz to 20KHz", "octaves above 0 dB: " + ", ".join(f"{c:g}" for c, v in wide.octave_snr_db.items() if v > 0) + " Hz",
-              "the 2006 simulation is not described here; ours has camera noise, random texture and an aperture, and noise rises with frequency"),
-        Claim("1", "synthetic data: envelope r about 0.88 (2006)", both(wide) + ", 200 Hz … 20 kHz",
-              "another sound, window and simulator; ours is noise, all of whose octaves are equally loud, so a third of it lies above 5 kHz"),
-        Claim("1", "a thin layer of aluminum powder, about 1 µm", "the texture `powder` of the simulator", "without texture there is no flow; so here"),
+        Claim(
+            "1",
+            "synthetic data: useful from 200Hz to 20KHz",
+            "octaves above 0 dB: " + ", ".join(f"{c:g}" for c, v in wide.octave_snr_db.items() if v > 0) + " Hz",
+            "the 2006 simulation is not described here; ours has camera noise, random texture and an "
+            "aperture, and noise rises with frequency",
+        ),
+        Claim(
+            "1",
+            "synthetic data: envelope r about 0.88 (2006)",
+            both(wide) + ", 200 Hz … 20 kHz",
+            "another sound, window and simulator; ours is noise, all of whose octaves are equally loud, "
+            "so a third of it lies above 5 kHz",
+        ),
+        Claim(
+            "1",
+            "a thin layer of aluminum powder, about 1 µm",
+            "the texture `powder` of the simulator",
+            "without texture there is no flow; so here",
+        ),
         Claim("7, fig. 6", "A Fine Romance: r = 0.559", both(song_heard.found), REAL),
         Claim("7, fig. 8", "damaged groove, Give a little, take a little: r = 0.564", both(damaged.found), REAL),
-        Claim("7", "r = 0.559 and 0.564", f"if all that differs is noise, {snr_of_r_db(0.559):+.1f} and {snr_of_r_db(0.564):+.1f} dB",
-              f"r²/(1 − r²): {percent(0.559**2)} of the power recovered is the sound; “the music part is lost in the noise” fits"),
-        Claim("7", "processed with the RIAA filter", "the song was cut with RIAA and played through it",
-              "RIAA is of 1954; most 78s are older and were cut otherwise. Ours is a choice (`--characteristic`)"),
-        Claim("7", "6000 groups of 12 images, about 3 seconds, two weeks", f"{song_heard.groups} groups of {FRAMES} images for {1e3 * SECONDS:.0f} ms, {groups_a_second:.0f} groups a second",
-              "groups here overlap by 6 %; 4 images a group keep this page short"),
-        Claim("7", "popping noise is attenuated", f"{percent(damaged.filled_share, 1)} of the damaged passage is filled in and flagged",
-              "there is no stylus here whose pops could be compared"),
-    ]  # fmt: skip
+        Claim(
+            "7",
+            "r = 0.559 and 0.564",
+            f"if all that differs is noise, {snr_of_r_db(0.559):+.1f} and {snr_of_r_db(0.564):+.1f} dB",
+            f"r²/(1 − r²): {percent(0.559**2)} of the power recovered is the sound; “the music part is "
+            "lost in the noise” fits",
+        ),
+        Claim(
+            "7",
+            "processed with the RIAA filter",
+            "the song was cut with RIAA and played through it",
+            "RIAA is of 1954; most 78s are older and were cut otherwise. Ours is a choice (`--characteristic`)",
+        ),
+        Claim(
+            "7",
+            "6000 groups of 12 images, about 3 seconds, two weeks",
+            f"{song_heard.groups} groups of {FRAMES} images for {1e3 * SECONDS:.0f} ms, "
+            f"{groups_a_second:.0f} groups a second",
+            "groups here overlap by 6 %; 4 images a group keep this page short",
+        ),
+        Claim(
+            "7",
+            "popping noise is attenuated",
+            f"{percent(damaged.filled_share, 1)} of the damaged passage is filled in and flagged",
+            "there is no stylus here whose pops could be compared",
+        ),
+    ]
 
 
 def make(folder: Path = FOLDER, tell: Tell | None = None) -> Page:
@@ -226,13 +281,15 @@ def make(folder: Path = FOLDER, tell: Tell | None = None) -> Page:
     chance = chance_r(seconds=SECONDS, trials=40)
     page = Page("sound", "Sound from surface orientation (section 7, figures 6 and 8)", folder=folder)
     page.finding = (
-        f"Song r = {song_heard.found.waveform_r:.3f} (paper 0.559), damaged groove r = {damaged.found.waveform_r:.3f} (paper 0.564), "
+        f"Song r = {song_heard.found.waveform_r:.3f} (paper 0.559), damaged groove r = "
+        f"{damaged.found.waveform_r:.3f} (paper 0.564), "
         f"both from simulated films; the synthetic envelope r = {synthetic.found.envelope_r:.3f} (paper 0.88)."
     )
-    page.say(f"""From film to sound with the recipe `seed-paper` at {RATE_HZ / 1e3:.0f} kHz: {what}, {1e3 * SECONDS:.0f} ms, cut at 3 cm/s with the RIAA
-        characteristic; {damaged_what}; and noise that is equally loud in every octave from 200 Hz to 20 kHz. *Recorded* is the velocity of the groove
-        that was cut, *recovered* what came out of the pictures. All correlations are Pearson's product-moment
-        correlation, after delay and gain have been taken out; {1e3 * TRIM_S:.0f} ms at both ends do not count.""")
+    page.say(f"""From film to sound with the recipe `seed-paper` at {RATE_HZ / 1e3:.0f} kHz: {what},
+        {1e3 * SECONDS:.0f} ms, cut at 3 cm/s with the RIAA characteristic; {damaged_what}; and noise that is equally
+        loud in every octave from 200 Hz to 20 kHz. *Recorded* is the velocity of the groove that was cut, *recovered*
+        what came out of the pictures. All correlations are Pearson's product-moment correlation, after delay and gain
+        have been taken out; {1e3 * TRIM_S:.0f} ms at both ends do not count.""")
     page.table(
         ("sound", "band (Hz)", "span (ms)", "r waveform", "r envelope", "signal to noise (dB)", "paper"),
         [
@@ -243,22 +300,36 @@ def make(folder: Path = FOLDER, tell: Tell | None = None) -> Page:
             _row("noise, 200 Hz … 20 kHz", synthetic.found, "envelope r = 0.88"),
         ],
     )
-    page.say(f"""What would chance score? Two unrelated stretches of noise of this length, aligned as well as they can be, reach
-        r = {chance[0]:.2f} (waveform) and {chance[1]:.2f} (envelope; median of 40 pairs). The envelope's window here is {1e3 * song_heard.found.envelope_window_s:.1f} ms;
-        the paper does not print its own, nor which of the two its correlation is of, and envelopes correlate by chance more easily than waveforms do. A held note, on the other hand,
-        has an envelope with little in it to correlate: the song's groove scores {song_heard.found.envelope_r:.3f} by envelope and
-        {song_heard.found.waveform_r:.3f} by waveform.""")
+    page.say(f"""What would chance score? Two unrelated stretches of noise of this length, aligned as well as they can
+        be, reach r = {chance[0]:.2f} (waveform) and {chance[1]:.2f} (envelope; median of 40 pairs). The envelope's
+        window here is {1e3 * song_heard.found.envelope_window_s:.1f} ms; the paper does not print its own, nor which
+        of the two its correlation is of, and envelopes correlate by chance more easily than waveforms do. A held
+        note, on the other hand, has an envelope with little in it to correlate: the song's groove scores
+        {song_heard.found.envelope_r:.3f} by envelope and {song_heard.found.waveform_r:.3f} by waveform.""")
     page.claims(_claims(song_heard, damaged, synthetic))
     page.head("The song")
-    page.picture(waves_figure(song_heard), "song", f"""Recorded and recovered groove velocity of the song, and their peak envelopes (windows of {1e3 * FIGURE_WINDOW_S:.1f} ms);
-        compare figure 6 of the paper.""")
+    page.picture(
+        waves_figure(song_heard),
+        "song",
+        f"""Recorded and recovered groove velocity of the song, and their peak envelopes (windows of
+        {1e3 * FIGURE_WINDOW_S:.1f} ms); compare figure 6 of the paper.""",
+    )
     page.head("The damaged groove")
-    page.picture(waves_figure(damaged), "damaged", f"""Recorded and recovered groove velocity of a damaged passage; compare figure 8 of the paper.
-        {percent(damaged.filled_share, 1)} of it was filled in.""")
+    page.picture(
+        waves_figure(damaged),
+        "damaged",
+        f"""Recorded and recovered groove velocity of a damaged passage; compare figure 8 of the paper.
+        {percent(damaged.filled_share, 1)} of it was filled in.""",
+    )
     page.head("200 Hz to 20 kHz?")
-    page.say("""A position that is measured with white noise gives a velocity whose noise rises by 6 dB an octave, while music falls. So
-        the treble is lost first, whatever the method. Noise of equal power in every octave shows where:""")
-    page.picture(octaves_figure(synthetic), "octaves", """Signal to noise ratio by octave of noise that is equally loud in every octave, cut at 3 cm/s in all.""")
+    page.say("""A position that is measured with white noise gives a velocity whose noise rises by 6 dB an octave,
+        while music falls. So the treble is lost first, whatever the method. Noise of equal power in every octave
+        shows where:""")
+    page.picture(
+        octaves_figure(synthetic),
+        "octaves",
+        """Signal to noise ratio by octave of noise that is equally loud in every octave, cut at 3 cm/s in all.""",
+    )
     page.write()
     return page
 
