@@ -129,6 +129,7 @@ def tree_section(page: Page, tree: ImageArray, others: dict[str, PairFlow]) -> l
     )
     page.head("The same solver on registered frames")
     registered_words(page, tree, rows)
+    textured = flow_tree.steep(flow_tree.modified_derivatives(tree))
     maps = {
         "true": Flow(np.broadcast_to(TRUE.u, tree.shape[1:]), TRUE.v),
         "original": flow_tree.original_flow(tree),
@@ -137,9 +138,9 @@ def tree_section(page: Page, tree: ImageArray, others: dict[str, PairFlow]) -> l
         "registered first, 100 sweeps": ours.flow,
     }
     page.picture(
-        flow_figures.speed_maps(tree[flow_tree.MIDDLE], maps, limits_px=(0.0, 2.6)),
+        flow_figures.speed_maps(textured, maps, limits_px=(0.0, 2.6)),
         "tree",
-        "Frame 20 of the translating tree and u of five flows on one scale. Blurred or even regions get their flow from their "
+        "Where the translating tree has gradients of 5 or more, and u of five flows on one scale. Blurred or even regions get their flow from their "
         "neighbours only, and 100 sweeps do not carry it far. Registered frames leave the right border to few of them, and "
         "there the flow is unsure.",
     )

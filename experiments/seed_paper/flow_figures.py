@@ -15,15 +15,17 @@ from gramoscope.pickup.flow.horn_schunck import Flow
 from gramoscope.signal_path import ImageArray
 
 ERROR_LIMITS_PX = (2e-3, 2.0)
+GROOVE_COLUMNS = 400
+"""So much of a groove's picture is drawn: all of it looks alike."""
 COLOURS = (ink.VERMILLION, ink.BLUE, ink.ORANGE, ink.BLACK)
 
 
-def speed_maps(image: ImageArray, flows: Mapping[str, Flow], *, limits_px: tuple[float, float]) -> Figure:
-    """Draw a frame and u of five flows on one scale."""
+def speed_maps(textured: BoolArray, flows: Mapping[str, Flow], *, limits_px: tuple[float, float]) -> Figure:
+    """Draw where there is texture, and u of five flows on one scale."""
     figure = ink.blank_figure(9.6, 6.2)
     axes = np.ravel(figure.subplots(2, 3, sharex=True, sharey=True))
-    axes[0].imshow(image, cmap="gray", interpolation="nearest")
-    _label(axes[0], "the frame")
+    axes[0].imshow(textured, cmap="gray_r", interpolation="nearest")
+    _label(axes[0], "gradient of 5 or more")
     for place, (name, flow) in zip(axes[1:], flows.items(), strict=True):
         shown = place.imshow(flow.u, cmap="viridis", vmin=limits_px[0], vmax=limits_px[1], interpolation="nearest")
         _label(place, name)
@@ -77,12 +79,13 @@ def error_over_time(panels: Mapping[str, Sequence[tuple[float, float, bool]]]) -
 
 def groove_maps(image: ImageArray, sharp: BoolArray, errors: Mapping[str, FloatArray]) -> Figure:
     """Draw a groove frame with its sharp zones outlined, and maps of the end-point error on one logarithmic scale."""
+    image, sharp = image[:, :GROOVE_COLUMNS], sharp[:, :GROOVE_COLUMNS]
     figure = ink.blank_figure(9.4, 7.4)
     axes = np.ravel(figure.subplots(2, 2, sharex=True, sharey=True))[: 1 + len(errors)]
     axes[0].imshow(image, cmap="gray", interpolation="nearest")
     _label(axes[0], "the frame; dotted: sharp zones")
     for place, (name, error) in zip(axes[1:], errors.items(), strict=True):
-        shown = place.imshow(error, cmap="magma", norm=LogNorm(*ERROR_LIMITS_PX), interpolation="nearest")
+        shown = place.imshow(error[:, :GROOVE_COLUMNS], cmap="magma", norm=LogNorm(*ERROR_LIMITS_PX), interpolation="nearest")
         _label(place, name)
     for place in axes:
         place.contour(sharp, levels=[0.5], colors=ink.SKY, linewidths=0.7, linestyles="dotted")
