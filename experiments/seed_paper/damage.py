@@ -14,7 +14,7 @@ from experiments.seed_paper.page import FOLDER, Claim, Page, percent
 from experiments.seed_paper.pictures import draw_accumulator, draw_picture, draw_places, draw_regions
 from experiments.seed_paper.take import NOISE_RATE_HZ, Take, film_in_memory, noise_sound, short_bench
 from gramoscope.conventions import BoolArray, FloatArray
-from gramoscope.disc.damage import Chip, Damage, Mark
+from gramoscope.disc.damage import NO_DAMAGE, Chip, Damage, Mark
 from gramoscope.listening import ink
 from gramoscope.pickup.centreline import discard_damaged_columns
 from gramoscope.pickup.search import line_rows
@@ -60,7 +60,7 @@ def film(damaged: bool = True) -> Take:
     width_m = bench.sensor.width_px * bench.sensor.pixel_pitch_m
     start_m = GROUP * bench.sequence.group_step_m
     chip = OneChip(middle_m=start_m + (CHIP_FROM + CHIP_TO) / 2 * width_m, length_m=(CHIP_TO - CHIP_FROM) * width_m)
-    scene = Scene(bench, seed=SEED, **({"damage": chip} if damaged else {}))
+    scene = Scene(bench, seed=SEED, damage=chip if damaged else NO_DAMAGE)
     sound = noise_sound(low_hz=200, high_hz=4000, seconds=0.1, seed=SEED)
     return film_in_memory(sound, NOISE_RATE_HZ, scene, [GROUP])
 

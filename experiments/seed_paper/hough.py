@@ -17,7 +17,7 @@ from gramoscope.listening import ink
 from gramoscope.pickup.search import HoughSearch
 from gramoscope.pickup.seed_paper import Reading, SeedPaperPickup
 from gramoscope.player.recipe import load_recipe
-from gramoscope.simulation.scene import LEVEL_M_S, Scene
+from gramoscope.simulation.scene import LEVEL_M_S, Scene, filming_bench
 
 SEED, FRAMES = 11, 12
 FIRST, GROUPS = 6, 6
@@ -43,7 +43,7 @@ class StripeFound:
 
 def straight_search() -> HoughSearch:
     """Return the paper's own search: the whole picture at once."""
-    return replace(load_recipe("seed-paper").pickup["hough"], segments=1)
+    return replace(load_recipe("seed-paper").pickup_for(filming_bench()).hough, segments=1)
 
 
 def sound() -> FloatArray:

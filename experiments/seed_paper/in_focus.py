@@ -151,13 +151,14 @@ def places_figure(take: Take, reading: Reading) -> Figure:
     """Draw a frame with its sharp zones, and the places where flow was found."""
     image = take.groups[0].images[0]
     columns = np.arange(image.shape[1], dtype=np.float64)
-    figure = ink.blank_figure(6.4, 4.8)
+    figure = ink.blank_figure(6.4, 3.9)
     above, below = figure.subplots(2, 1, sharex=True)
     draw_picture(above, image.astype(np.float64))
     for row in take.stripe_rows(take.groups[0], columns):
         for side in (-SHARP_REACH_PX, SHARP_REACH_PX):
             above.plot(columns, row + side, color=ink.YELLOW, linewidth=0.8)
     draw_places(below, reading)
+    below.set_xlim(-0.5, columns.size - 0.5)
     ink.heading(above, "a  One frame, and where the walls are sharp (yellow)")
     ink.heading(below, "b  Places with flow")
     above.set_xlabel("")

@@ -13,6 +13,7 @@ from experiments.seed_paper.damage import OneChip
 from experiments.seed_paper.page import FOLDER, Claim, Page, percent
 from experiments.seed_paper.take import NOISE_RATE_HZ, Take, film_in_memory, noise_sound, short_bench
 from gramoscope.conventions import BoolArray, FloatArray
+from gramoscope.disc.damage import NO_DAMAGE
 from gramoscope.listening import ink
 from gramoscope.listening.align import pearson_r
 from gramoscope.listening.compare import snr_db
@@ -79,8 +80,8 @@ def film(*, chipped: bool = False, rig: Rig | None = None) -> Take:
     """Film a passage of noise between 200 Hz and 6 kHz, whole or with a chip in one group."""
     bench = short_bench(frames=FRAMES, groups=FIRST + GROUPS)
     middle_m = (CHIPPED_GROUP + 0.5) * bench.sequence.group_step_m
-    damage = {"damage": OneChip(middle_m=middle_m, length_m=0.23e-3)} if chipped else {}
-    scene = Scene(bench, seed=SEED, rig=rig or Rig(), **damage)
+    damage = OneChip(middle_m=middle_m, length_m=0.23e-3) if chipped else NO_DAMAGE
+    scene = Scene(bench, seed=SEED, rig=rig or Rig(), damage=damage)
     sound = noise_sound(low_hz=200, high_hz=6000, seconds=0.1, seed=SEED)
     return film_in_memory(sound, NOISE_RATE_HZ, scene, range(FIRST, FIRST + GROUPS))
 
@@ -287,11 +288,11 @@ def make(folder: Path = FOLDER) -> Page:
         one and the same. Yet those that overlap little err the opposite way, because a centroid that tilts the one up
         tilts the other down; that is more than its state of two numbers can know.""")
     page.head("What remains of the choice of a neighbourhood")
-    page.say(f"""[Section 6](orientation.md) chooses 100 pixels as the best compromise. For raw slopes the size
-        matters much: from {NEIGHBOURHOODS_PX[0]:.0f} to {NEIGHBOURHOODS_PX[-1]:.0f} pixels they gain {spread[0]:.1f}
-        dB. The smoother knows how noisy each slope is, and leaves {spread[1]:.1f} dB of that. With music up to 6 kHz
-        a larger neighbourhood than the paper's would be better even so; what speaks for 100 is treble, which a long
-        neighbourhood averages away for good.""")
+    page.say(f"""[Section 6](orientation.md) of the paper chooses 100 pixels as the best compromise. For raw slopes
+        the size matters much: from {NEIGHBOURHOODS_PX[0]:.0f} to {NEIGHBOURHOODS_PX[-1]:.0f} pixels they gain
+        {spread[0]:.1f} dB. The smoother knows how noisy each slope is, and leaves {spread[1]:.1f} dB of that. With
+        music up to 6 kHz a larger neighbourhood than the paper's would be better even so; what speaks for 100 is
+        treble, which a long neighbourhood averages away for good.""")
     page.table(
         ("neighbourhood (px)", "raw: signal to noise (dB)", "smoothed (dB)", "smoothed: r"),
         [

@@ -16,7 +16,7 @@ from gramoscope.pickup.hough import Line
 from gramoscope.pickup.search import HoughSearch, Segment
 from gramoscope.pickup.seed_paper import Reading
 
-GREYS, HEAT = colormaps["gray"].resampled(14), colormaps["magma"].resampled(16)
+GREYS, HEAT = colormaps["gray"].resampled(12), colormaps["magma"].resampled(16)
 """Few colours make small files."""
 STRIPE_COLOURS = (ink.GREY, ink.ORANGE, ink.SKY)
 ROWS = (150, 450)

@@ -157,7 +157,7 @@ def waves_figure(heard: Heard) -> Figure:
     window = max(1, round(FIGURE_WINDOW_S * heard.rate_hz))
     names = ("a  Recorded", "b  Recovered", "c  Recorded, peak envelope", "d  Recovered, peak envelope")
     for column, (sound, colour) in enumerate(((recorded, ink.BLACK), (recovered, ink.BLUE))):
-        time_ms = 1e3 * np.arange(sound.size) / heard.rate_hz
+        time_ms = np.asarray(1e3 * np.arange(sound.size) / heard.rate_hz)
         _wave(panels[0, column], time_ms, sound, colour)
         envelope = 100 * peak_envelope(sound, window_samples=window)
         panels[1, column].step(time_ms[::window], envelope, color=colour, linewidth=1.0, where="post")

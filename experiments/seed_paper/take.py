@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 from scipy.signal import butter, sosfiltfilt
 
 from gramoscope.apparatus.bench import Bench
@@ -39,9 +40,11 @@ class Take:
         """Return where column 0 of each frame really was."""
         return filmed_group(self.scene, group.number).arc_start_m
 
-    def slope(self, group: FrameGroup, columns: FloatArray) -> FloatArray:
+    def slope(self, group: FrameGroup, columns: npt.ArrayLike) -> FloatArray:
         """Return the true slope of the groove at columns of the registered picture."""
-        return self.passage.slope(self.true_starts_m(group)[0] + columns * group.pixel_pitch_m)[0]
+        return np.asarray(
+            self.passage.slope(self.true_starts_m(group)[0] + np.asarray(columns) * group.pixel_pitch_m)[0]
+        )
 
 
 def noise_sound(*, low_hz: float, high_hz: float, seconds: float, seed: int) -> FloatArray:
