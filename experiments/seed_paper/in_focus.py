@@ -151,7 +151,7 @@ def places_figure(take: Take, reading: Reading) -> Figure:
     """Draw a frame with its sharp zones, and the places where flow was found."""
     image = take.groups[0].images[0]
     columns = np.arange(image.shape[1], dtype=np.float64)
-    figure = ink.blank_figure(6.4, 3.9)
+    figure = ink.blank_figure(5.8, 3.7)
     above, below = figure.subplots(2, 1, sharex=True)
     draw_picture(above, image.astype(np.float64))
     for row in take.stripe_rows(take.groups[0], columns):
