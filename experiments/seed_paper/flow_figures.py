@@ -9,13 +9,14 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
+from experiments.seed_paper.pictures import GREYS, HEAT
 from gramoscope.conventions import BoolArray, FloatArray
 from gramoscope.listening import ink
 from gramoscope.pickup.flow.horn_schunck import Flow
 from gramoscope.signal_path import ImageArray
 
 ERROR_LIMITS_PX = (2e-3, 2.0)
-GROOVE_COLUMNS = 400
+GROOVE_COLUMNS = 180
 """So much of a groove's picture is drawn: all of it looks alike."""
 COLOURS = (ink.VERMILLION, ink.BLUE, ink.ORANGE, ink.BLACK)
 
@@ -80,12 +81,14 @@ def error_over_time(panels: Mapping[str, Sequence[tuple[float, float, bool]]]) -
 def groove_maps(image: ImageArray, sharp: BoolArray, errors: Mapping[str, FloatArray]) -> Figure:
     """Draw a groove frame with its sharp zones outlined, and maps of the end-point error on one logarithmic scale."""
     image, sharp = image[:, :GROOVE_COLUMNS], sharp[:, :GROOVE_COLUMNS]
-    figure = ink.blank_figure(9.4, 7.4)
+    figure = ink.blank_figure(7.6, 6.4)
     axes = np.ravel(figure.subplots(2, 2, sharex=True, sharey=True))[: 1 + len(errors)]
-    axes[0].imshow(image, cmap="gray", interpolation="nearest")
+    axes[0].imshow(image, cmap=GREYS, interpolation="nearest")
     _label(axes[0], "the frame; dotted: sharp zones")
     for place, (name, error) in zip(axes[1:], errors.items(), strict=True):
-        shown = place.imshow(error[:, :GROOVE_COLUMNS], cmap="magma", norm=LogNorm(*ERROR_LIMITS_PX), interpolation="nearest")
+        shown = place.imshow(
+            error[:, :GROOVE_COLUMNS], cmap=HEAT, norm=LogNorm(*ERROR_LIMITS_PX), interpolation="nearest"
+        )
         _label(place, name)
     for place in axes:
         place.contour(sharp, levels=[0.5], colors=ink.SKY, linewidths=0.7, linestyles="dotted")
