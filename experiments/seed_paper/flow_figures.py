@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -16,7 +17,8 @@ from gramoscope.pickup.flow.horn_schunck import Flow
 from gramoscope.signal_path import ImageArray
 
 ERROR_LIMITS_PX = (2e-3, 2.0)
-GROOVE_COLUMNS = 180
+TITLE_LETTERS = 26
+GROOVE_COLUMNS = 140
 """So much of a groove's picture is drawn: all of it looks alike."""
 COLOURS = (ink.VERMILLION, ink.BLUE, ink.ORANGE, ink.BLACK)
 
@@ -37,7 +39,7 @@ def speed_maps(textured: BoolArray, flows: Mapping[str, Flow], *, limits_px: tup
 
 def _label(axes: Axes, name: str) -> None:
     ink.dress(axes, x="column (px)", y="row (px)", grid=False)
-    axes.set_title(name, loc="left", fontsize=ink.MEDIUM, color=ink.BLACK)
+    axes.set_title(textwrap.fill(name, TITLE_LETTERS), loc="left", fontsize=ink.MEDIUM, color=ink.BLACK)
 
 
 def sweeps_figure(sweeps: Sequence[int], errors: Mapping[str, Sequence[float]], published_deg: float) -> Figure:
@@ -81,8 +83,8 @@ def error_over_time(panels: Mapping[str, Sequence[tuple[float, float, bool]]]) -
 def groove_maps(image: ImageArray, sharp: BoolArray, errors: Mapping[str, FloatArray]) -> Figure:
     """Draw a groove frame with its sharp zones outlined, and maps of the end-point error on one logarithmic scale."""
     image, sharp = image[:, :GROOVE_COLUMNS], sharp[:, :GROOVE_COLUMNS]
-    figure = ink.blank_figure(7.6, 6.4)
-    axes = np.ravel(figure.subplots(2, 2, sharex=True, sharey=True))[: 1 + len(errors)]
+    figure = ink.blank_figure(10.4, 5.0)
+    axes = np.ravel(figure.subplots(1, 1 + len(errors), sharex=True, sharey=True))
     axes[0].imshow(image, cmap=GREYS, interpolation="nearest")
     _label(axes[0], "the frame; dotted: sharp zones")
     for place, (name, error) in zip(axes[1:], errors.items(), strict=True):
