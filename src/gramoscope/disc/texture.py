@@ -13,7 +13,6 @@ further than walls and bottom reach.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numba
 import numpy as np
@@ -29,6 +28,11 @@ TILE = 128
 FIRST_TILE = 1 << 30
 """Tiles are numbered from here, because seeds cannot be negative and places can."""
 STREAM = 0x7E87
+
+TAPS = 8
+"""Texels that take part in looking up a place between them."""
+PHASES = 256
+"""Places that are told apart between two texels; 1.5 nm at 0.39 µm."""
 
 Field = npt.NDArray[np.float32]
 
@@ -158,21 +162,24 @@ def sample_across(field: Field, along_m: FloatArray, *, pitch_m: float) -> Field
     Returns
     -------
     float32 array, shape (column,)
-        By the cubic of Catmull and Rom through four texels.
+        By the weights of `texel_weights`.
     """
-    place = along_m / pitch_m + ACROSS / 2
-    floor = np.floor(place).astype(np.int64)
-    weights = catmull_rom(place - floor)
-    column = np.arange(field.shape[1])
-    return np.asarray(sum(weights[k] * field[(floor + k - 1) % ACROSS, column] for k in range(4)), np.float32)
+    phase = np.floor(along_m / pitch_m * PHASES + 0.5).astype(np.int64)
+    first = phase // PHASES + ACROSS // 2 - (TAPS // 2 - 1)
+    texels = field[(first + np.arange(TAPS)[:, None]) % ACROSS, np.arange(field.shape[1])]
+    return np.asarray(np.sum(texel_weights()[phase % PHASES].T * texels, axis=0), np.float32)
 
 
-@numba.njit(cache=True, nogil=True)
-def catmull_rom(t: Any) -> tuple[Any, Any, Any, Any]:
-    """Return the weights of the four neighbours at the fraction 0 ≤ t < 1 between the second and the third (any shape)."""
-    return (
-        0.5 * t * (-1 + t * (2 - t)),
-        1 + 0.5 * t * t * (-5 + 3 * t),
-        0.5 * t * (1 + t * (4 - 3 * t)),
-        0.5 * t * t * (t - 1),
-    )
+def texel_weights() -> Field:
+    """Return how much each of `TAPS` texels counts at each of `PHASES` places between the middle two.
+
+    A sinc under a Kaiser window (β = 5), scaled to sum 1: waves of up to 0.3 cycles a texel come out within 0.5 %, and their
+    false images beyond 0.7 stay below that. A cubic through four texels leaves a tenth of its images.
+
+    Returns
+    -------
+    float32 array, shape (`PHASES`, `TAPS`)
+    """
+    away = np.arange(TAPS) - (TAPS // 2 - 1) - np.arange(PHASES)[:, None] / PHASES
+    weights = np.sinc(away) * np.i0(5.0 * np.sqrt(np.maximum(0, 1 - (away / (TAPS / 2)) ** 2)))
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True), np.float32)

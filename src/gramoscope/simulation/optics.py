@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from gramoscope.conventions import FloatArray
 from gramoscope.disc.texture import Field
-from gramoscope.simulation.disc_blur import COARSE, LARGEST_PX, blur
+from gramoscope.simulation.disc_blur import COARSE, LARGEST_PX, PER_ROW, blur
 from gramoscope.simulation.scene import Scene
 from gramoscope.simulation.surface import Strip
 
@@ -68,14 +68,14 @@ def _focused(scene: Scene, strip: Strip, rows: slice, sharp_height_m: float) -> 
     pitch_m = scene.bench.sensor.pixel_pitch_m
     tangent = np.float32(scene.bench.objective.blur_radius_per_defocus)
     radius_px = (height_m - np.float32(sharp_height_m)) * (tangent / np.float32(pitch_m))
-    slope_tan = np.gradient(radius_px, axis=0)
+    slope_tan = np.gradient(radius_px, np.float32(1 / PER_ROW), axis=0)
     return blur(light, radius_px, slope_tan, floor_px=scene.floor_px, margin_px=LARGEST_PX)
 
 
 def _rows(surface: Field, first: int, count: int) -> Field:
-    """Return picture rows with their margins; beyond the surface the last row is repeated."""
-    rows = np.minimum(np.arange(first, first + count + 2 * LARGEST_PX), len(surface) - 1)
-    return surface[rows]
+    """Return the sources of picture rows and their margins; beyond the surface the last row is repeated."""
+    rows = np.arange(PER_ROW * first, PER_ROW * (first + count + 2 * LARGEST_PX))
+    return surface[np.minimum(rows, len(surface) - 1)]
 
 
 def field_of(scene: Scene) -> Field:

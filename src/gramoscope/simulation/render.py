@@ -69,7 +69,8 @@ def noise_free_strip(scene: Scene, passage: Passage, filmed: FilmedGroup) -> tup
     """Return the picture of the whole stretch that a group sees, and the place of its column 0 in pitches from s = 0."""
     sensor = scene.bench.sensor
     start_px = filmed.arc_start_m / sensor.pixel_pitch_m
-    first = int(np.floor(start_px.min())) - TAPS // 2
+    # on the raster of blocks, so that the same place is blurred alike whichever group shows it
+    first = (int(np.floor(start_px.min())) - TAPS // 2) // COARSE * COARSE
     wanted = int(np.ceil(start_px.max())) + sensor.width_px + TAPS // 2 + 1 - first
     columns = -(-wanted // COARSE) * COARSE
     strip = surface_strip(

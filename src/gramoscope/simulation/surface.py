@@ -1,7 +1,8 @@
 """The surface under the microscope: height and brightness of every point of one strip of record.
 
 A strip lies on the raster of the record itself, columns at whole pixel pitches from s = 0, so that the same place of the
-record has the same texture whenever it is filmed.
+record has the same texture whenever it is filmed. Across the groove there are `PER_ROW` rows of surface for each row of
+pixels, evenly spread over it: walls are steep, and a row shows more of them than a column.
 """
 
 from __future__ import annotations
@@ -14,9 +15,12 @@ import numpy as np
 from gramoscope.conventions import FloatArray, lateral_of_row_m
 from gramoscope.disc.damage import spoil_surface
 from gramoscope.disc.groove import section
-from gramoscope.disc.texture import ACROSS, Field, catmull_rom
+from gramoscope.disc.texture import ACROSS, PHASES, TAPS, Field, texel_weights
+from gramoscope.simulation.disc_blur import PER_ROW
 from gramoscope.simulation.passage import Passage
 from gramoscope.simulation.scene import Scene
+
+TEXEL_WEIGHTS = texel_weights()
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,13 +53,13 @@ def surface_strip(
     first_column, columns : int
         The stretch, in pixel pitches from s = 0.
     margin_px : int
-        Rows beyond the picture on either side.
+        Rows of pixels beyond the picture on either side.
     stage_m : float
         Radial position of the microscope.
     """
     sensor = scene.bench.sensor
     arc_m = np.arange(first_column, first_column + columns, dtype=np.float64) * sensor.pixel_pitch_m
-    rows = np.arange(-margin_px, sensor.height_px + margin_px)
+    rows = (np.arange(PER_ROW * (sensor.height_px + 2 * margin_px)) + 0.5) / PER_ROW - 0.5 - margin_px
     lateral_m = lateral_of_row_m(rows, height_px=sensor.height_px, pixel_pitch_m=sensor.pixel_pitch_m, stage_m=stage_m)
     height_m, light = _clean_surface(scene, passage, first_column, arc_m, lateral_m)
     marks = scene.damage.marks(
@@ -131,9 +135,11 @@ def _shade(z: float, slope_s: float, slope_l: float, lamps: FloatArray) -> float
 
 @numba.njit(cache=True, nogil=True)
 def _albedo(texture: Field, place: float, column: int) -> float:
-    """Look the texture up at an arc length in pixels, between four texels."""
-    floor = int(np.floor(place))
-    row = floor + ACROSS // 2
-    before, here, there, beyond = catmull_rom(place - floor)
-    total = before * texture[(row - 1) % ACROSS, column] + here * texture[row % ACROSS, column]
-    return float(total + there * texture[(row + 1) % ACROSS, column] + beyond * texture[(row + 2) % ACROSS, column])
+    """Look the texture up at an arc length in texels; the sum that `sample_across` writes for whole arrays."""
+    phase = int(np.floor(place * PHASES + 0.5))
+    first = phase // PHASES + ACROSS // 2 - (TAPS // 2 - 1)
+    weights = TEXEL_WEIGHTS[phase % PHASES]
+    total = np.float32(0)
+    for tap in range(TAPS):
+        total += weights[tap] * texture[(first + tap) % ACROSS, column]
+    return float(total)
