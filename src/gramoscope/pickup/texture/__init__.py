@@ -1,0 +1,1 @@
+"""Reading a wall by the relations between neighbouring rows of its texture."""

@@ -1,0 +1,172 @@
+"""The coarse search: roughly where the groove runs through one stretch, by all its stripes together.
+
+For every cell of columns and every displacement of the groove, lateral and vertical, the ridges at the places where the
+model puts the stripes are added up; a stripe that the model puts out of sight adds nothing. The best path through these
+sums, with steps from cell to cell no steeper than a groove can be, is found by Viterbi's algorithm, which needs no start
+and is not led astray by a scratch, a chipped wall or a stripe that vanishes for a while. Then each wall looks for its own
+path near the common one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from gramoscope.conventions import INNER, OUTER, FloatArray
+from gramoscope.disc.formats import Cut
+from gramoscope.errors import require
+from gramoscope.pickup.texture.layout import StripeLayout, wall_sign
+from gramoscope.pickup.texture.sharpness import CELL_PX, ridges
+
+BOTTOM_PX = 8.0
+"""Nearer to the middle of the groove its rounded bottom leaves no wall to be sharp on."""
+
+
+@numba.njit(cache=True, nogil=True)
+def best_path(score, largest_step, step_cost):  # type: ignore[no-untyped-def]
+    """Return the path through score[cell, i, j] with the largest sum, and that sum (A. Viterbi, 1967).
+
+    From cell to cell i and j change by at most `largest_step[0]` and `[1]`, each at a cost of its `step_cost` times the
+    square of the change.
+    """
+    cells, rows, columns = score.shape
+    best = score[0].copy()
+    back = np.zeros((cells, rows, columns), np.int16)
+    new = np.empty((rows, columns))
+    for cell in range(1, cells):
+        for i in range(rows):
+            for j in range(columns):
+                top = -np.inf
+                choice = 0
+                for di in range(-min(largest_step[0], i), min(largest_step[0], rows - 1 - i) + 1):
+                    cost = step_cost[0] * di * di
+                    for dj in range(-min(largest_step[1], j), min(largest_step[1], columns - 1 - j) + 1):
+                        value = best[i + di, j + dj] - cost - step_cost[1] * dj * dj
+                        if value > top:
+                            top = value
+                            choice = (di + largest_step[0]) * (2 * largest_step[1] + 1) + dj + largest_step[1]
+                new[i, j] = top + score[cell, i, j]
+                back[cell, i, j] = choice
+        best[:] = new
+    path = np.empty((2, cells), np.int64)
+    end = np.argmax(best)
+    i, j = end // columns, end % columns
+    total = best[i, j]
+    path[0, -1], path[1, -1] = i, j
+    for cell in range(cells - 1, 0, -1):
+        choice = back[cell, i, j]
+        i += choice // (2 * largest_step[1] + 1) - largest_step[0]
+        j += choice % (2 * largest_step[1] + 1) - largest_step[1]
+        path[0, cell - 1], path[1, cell - 1] = i, j
+    return path, total
+
+
+@dataclass(frozen=True)
+class GrooveSearch:
+    """The coarse search.
+
+    Parameters
+    ----------
+    swing_px : float
+        Largest displacement of the groove in the direction of its cut, if that is vertical or 45/45; a lateral cut may
+        swing as far as the picture shows.
+    drift_px : float
+        Largest slow displacement in a direction that the cut does not use (warp, focus, an eccentric hole).
+    step_cost : float
+        For the square of one row from cell to cell, in units of a stripe's sharpness: keeps paths from jittering.
+    wall_reach_px : float
+        How far a single wall may run from the common path.
+    absent : float
+        Sharpness below which a stripe that should be seen speaks against a path.
+    usual_swing_px, swing_cost : float
+        Displacements of that size cost so much sharpness, and others as their squares: where one stripe alone is seen it
+        is taken for the one that needs the smaller swing.
+    """
+
+    swing_px: float = 120.0
+    drift_px: float = 18.0
+    step_cost: float = 0.02
+    wall_reach_px: float = 8.0
+    absent: float = 0.2
+    usual_swing_px: float = 200.0
+    swing_cost: float = 0.15
+
+    def __post_init__(self) -> None:
+        require(self.usual_swing_px > 0, f"a usual swing of {self.usual_swing_px} px", "above 0")
+
+    def find(self, sharp: FloatArray, layout: StripeLayout, *, cut: Cut) -> tuple[FloatArray, FloatArray]:
+        """Return where both walls run.
+
+        Parameters
+        ----------
+        sharp : float64 array, shape (cell, row)
+            From `texture.sharpness`.
+        layout : StripeLayout
+        cut : {"lateral", "vertical", "stereo"}
+
+        Returns
+        -------
+        displacement_px : float64 array, shape (2, cell)
+            Of each wall.
+        support : float64 array, shape (2, cell)
+            Sharpness of the ridges found for each wall, the sharpest of them; 0 where none can be seen.
+        """
+        ridge = ridges(sharp)
+        lateral, vertical = self._common(ridge, layout, cut)
+        common = np.array([lateral - vertical, lateral + vertical])
+        return self._own_paths(ridge, layout, common)
+
+    def _common(self, ridge: FloatArray, layout: StripeLayout, cut: Cut) -> tuple[FloatArray, FloatArray]:
+        """Return the lateral and the vertical displacement that suit all stripes, on a grid of `GRID_PX`."""
+        height = ridge.shape[1]
+        reach = {
+            "lateral": (height, self.drift_px),
+            "vertical": (self.drift_px, self.swing_px),
+            "stereo": (self.swing_px, self.swing_px),
+        }[cut]
+        lateral, vertical = (GRID_PX * np.arange(-int(r // GRID_PX), int(r // GRID_PX) + 1) for r in reach)
+        # on a coarse grid a ridge is where any of its rows is
+        wide = np.maximum(ridge, np.maximum(np.roll(ridge, 1, axis=1), np.roll(ridge, -1, axis=1)))
+        usual = (lateral[:, None] / self.usual_swing_px) ** 2 + (vertical / self.usual_swing_px) ** 2
+        score = np.tile(-self.swing_cost * usual, (len(ridge), 1, 1))
+        signs = wall_sign(layout.wall)
+        stripes = zip(layout.rest_row, signs, layout.first_row, layout.last_row, layout.from_bottom_px, strict=True)
+        for rest, sign, low, high, from_bottom in stripes:
+            rows = np.round(rest + lateral[:, None] + sign * vertical).astype(np.int64)
+            depth = from_bottom - vertical
+            seen = (rows >= low) & (rows <= high) & (depth > BOTTOM_PX) & (depth < layout.half_width_px)
+            score[:, seen] += wide[:, rows[seen]] - self.absent
+        used = [cut != "vertical", cut != "lateral"]
+        steps = np.array([1 if use else int(len(ridge) > 1) for use in used])
+        # what the cut does not use changes slowly: a step of one grid point costs as much as a cell without its stripes
+        costs = np.array([self.step_cost * GRID_PX if use else 1.0 for use in used])
+        path, _ = best_path(score, steps, costs)
+        return lateral[path[0]].astype(np.float64), vertical[path[1]].astype(np.float64)
+
+    def _own_paths(
+        self, ridge: FloatArray, layout: StripeLayout, common: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Let each wall look for its stripes, row by row, near the common path."""
+        path, support = common.copy(), np.zeros_like(common)
+        aside = np.arange(-int(self.wall_reach_px), int(self.wall_reach_px) + 1)
+        cells = np.arange(len(ridge))
+        for wall in (INNER, OUTER):
+            mine = layout.of_wall(wall)
+            score = np.zeros((len(ridge), aside.size))
+            for rest, low, high in zip(mine.rest_row, mine.first_row, mine.last_row, strict=True):
+                rows = np.round(rest + common[wall][:, None] + aside).astype(np.int64)
+                seen = (rows >= low) & (rows <= high)
+                found = np.where(seen, ridge[cells[:, None], np.clip(rows, 0, ridge.shape[1] - 1)], 0.0)
+                score += found
+                support[wall] = np.maximum(support[wall], found.max(axis=1))
+            pull = -0.3 * self.step_cost * aside.astype(np.float64) ** 2
+            steps, costs = np.array([3, 0]), np.array([self.step_cost, 0.0])
+            own, _ = best_path((score + pull)[:, :, None], steps, costs)
+            path[wall] += aside[own[0]]
+        return path, support
+
+
+GRID_PX = 3
+"""Step of the common search; with ridges seven rows wide nothing is missed, and one step a cell is a slope of 0.37."""

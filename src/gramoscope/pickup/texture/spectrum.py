@@ -1,0 +1,204 @@
+"""How the rows of a followed window hang together, frequency by frequency along the groove.
+
+Neighbouring rows of a wall show the same texture through slightly different blur. With the window's rows as a vector x(s),
+stationary along the groove, everything that second moments can tell is in the cross-spectra
+
+    C_f = Σ_τ E[x(s) x(s + τ)ᵀ] e^(−2πifτ),
+
+real because a groove has no preferred direction along itself. Lags beyond the blur discs carry nothing but chance, so the
+sums are cut off there (Blackman and Tukey's lag window), which also makes C_f smooth in f. Moving the window by δ across
+the rows changes C_f by δ · dC_f, with dC_f from the cross-spectra of the window and its derivative.
+
+A texture's power falls by five orders of magnitude along the band, and what leaks from the strong end would drown the weak
+end where the information is. All windows are therefore whitened along the groove first, by one short filter for all rows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import fft, signal
+
+from gramoscope.conventions import FloatArray
+from gramoscope.pickup.texture.following import Float32Array
+
+WHITENER_TAPS = 41
+
+
+@dataclass(frozen=True)
+class Band:
+    """The frequencies along the groove that are used, cycles a pixel.
+
+    Parameters
+    ----------
+    low, high : float
+        Below `low` lie shading and dirt, above `high` interpolation and noise.
+    """
+
+    low: float = 0.02
+    high: float = 0.35
+
+    def bins(self, length: int) -> slice:
+        """Return the bins of a real Fourier transform of that length that lie in the band."""
+        return slice(int(np.ceil(self.low * length)), int(np.floor(self.high * length)) + 1)
+
+
+def whitening_filter(power: FloatArray, band: Band) -> FloatArray:
+    """Return a symmetric filter that makes a power spectrum flat inside the band and keeps nothing outside.
+
+    Parameters
+    ----------
+    power : float64 array, shape (bin,)
+        Of a real transform, from 0 to ½ cycle a pixel.
+    band : Band
+
+    Returns
+    -------
+    float64 array, shape (41,)
+        Windowed frequency sampling of 1/√power; its response is zero at frequency 0 and its largest about 1.
+    """
+    frequency = np.linspace(0, 0.5, power.size)
+    gain = 1 / np.sqrt(power + power.max() * 1e-7)
+    gain /= 1 + np.exp((frequency - band.high) / 0.015)
+    gain *= 1 - np.exp(-((frequency / (0.6 * band.low)) ** 4))
+    response = np.fft.fftshift(fft.irfft(gain / gain.max()))
+    middle = response.size // 2
+    window = signal.get_window(("kaiser", 6.0), WHITENER_TAPS, fftbins=False)
+    taps = response[middle - WHITENER_TAPS // 2 : middle + WHITENER_TAPS // 2 + 1] * window
+    return np.asarray(taps - window * taps.sum() / window.sum())
+
+
+def filtered(rows: Float32Array, taps: FloatArray) -> Float32Array:
+    """Return rows filtered along the columns by a symmetric filter; zeros are assumed beyond the ends."""
+    width = rows.shape[-1]
+    length = fft.next_fast_len(width + taps.size - 1, real=True)
+    half = taps.size // 2
+    out = fft.irfft(fft.rfft(rows, length) * fft.rfft(taps.astype(np.float32), length), length)
+    return np.ascontiguousarray(out[..., half : half + width], np.float32)
+
+
+@dataclass(eq=False)
+class CrossSpectra:
+    """Sums of cross-spectra over many windows.
+
+    Parameters
+    ----------
+    rows : int
+    length : int
+        Of the transforms; at least a window's width and the largest lag.
+    """
+
+    rows: int
+    length: int
+
+    def __post_init__(self) -> None:
+        bins = self.length // 2 + 1
+        self.within: FloatArray = np.zeros((bins, self.rows, self.rows))
+        self.with_derivative: FloatArray = np.zeros((bins, self.rows, self.rows))
+        self.weight: FloatArray = np.zeros(bins)
+
+    def add(self, other: CrossSpectra) -> None:
+        """Add the sums of other windows."""
+        self.within += other.within
+        self.with_derivative += other.with_derivative
+        self.weight += other.weight
+
+    def spectra(self, *, largest_lag_px: int, length: int) -> tuple[FloatArray, FloatArray]:
+        """Return C_f and dC_f.
+
+        Parameters
+        ----------
+        largest_lag_px : int
+            The lag window is 1 to half of it and falls to zero as a cosine.
+        length : int
+            Of the transform in whose bins the answer is wanted.
+
+        Returns
+        -------
+        c, dc : float64 arrays, shape (length // 2 + 1, row, row)
+        """
+        lags = np.arange(largest_lag_px + 1)
+        u = lags / (largest_lag_px + 1)
+        taper = np.where(u < 0.5, 1.0, 0.5 * (1 + np.cos(2 * np.pi * (u - 0.5))))
+        columns = fft.irfft(self.weight, self.length)[lags]
+        taper = taper / np.maximum(columns, 1.0)
+        moved = self.with_derivative + self.with_derivative.transpose(0, 2, 1)
+        return self._tapered(self.within, taper, length), self._tapered(moved, taper, length)
+
+    def _tapered(self, spectra: FloatArray, taper: FloatArray, length: int) -> FloatArray:
+        covariance = fft.irfft(spectra, self.length, axis=0)[: taper.size] * taper[:, None, None]
+        full = np.zeros((length, self.rows, self.rows))
+        full[: taper.size] = covariance
+        full[-taper.size + 1 :] = covariance[1:][::-1]
+        return np.asarray(fft.rfft(full, axis=0).real)
+
+
+def cross_spectra(
+    window: Float32Array, derivative: Float32Array, weight: Float32Array, *, length: int
+) -> CrossSpectra:
+    """Return the cross-spectra of one window, zero where its columns have no weight.
+
+    Parameters
+    ----------
+    window, derivative : float32 arrays, shape (row, column)
+        Whitened.
+    weight : float32 array, shape (column,)
+        0 … 1, rising and falling softly.
+    length : int
+        Of the transforms.
+    """
+    x = np.ascontiguousarray(fft.rfft(window * weight, length).T)
+    d = np.ascontiguousarray(fft.rfft(derivative * weight, length).T)
+    out = CrossSpectra(window.shape[0], length)
+    out.within += _real_products(x, x)
+    out.with_derivative += _real_products(d, x)
+    out.weight += np.abs(fft.rfft(weight.astype(np.float64), length)) ** 2
+    return out
+
+
+def _real_products(a: npt.NDArray[np.complex64], b: npt.NDArray[np.complex64]) -> Float32Array:
+    """Return Re(a bᴴ) of each bin, shape (bin, row, row)."""
+    left = np.stack([a.real, a.imag], axis=2)
+    right = np.stack([b.real, b.imag], axis=1)
+    return np.asarray(left @ right)
+
+
+def precision(
+    c: FloatArray, *, band: slice, loading: float, smooth_bins: float = 16.0
+) -> Float32Array:
+    """Return the inverse of C_f in a band, safe against what the sample could not tell.
+
+    The least third of the eigenvalues of each C_f is noise; none is allowed below their mean (smoothed along f), and
+    `loading` times the mean of all is added to each: much of it makes a reader that is less exact and forgives more.
+
+    Parameters
+    ----------
+    c : float64 array, shape (bin, row, row)
+    band : slice
+        Bins to invert.
+    loading : float
+        Zero or more.
+    smooth_bins : float
+        Standard deviation of the smoothing along f.
+
+    Returns
+    -------
+    float32 array, shape (bin in the band, row, row)
+    """
+    from scipy.ndimage import gaussian_filter1d
+
+    value, vector = np.linalg.eigh(c[band])
+    rows = c.shape[1]
+    least = np.maximum(value[:, : rows // 3].mean(axis=1), 1e-12 * value[:, -1])
+    floor = gaussian_filter1d(least, smooth_bins, mode="nearest")
+    value = np.maximum(value, floor[:, None]) + loading * np.trace(c[band], axis1=1, axis2=2)[:, None] / rows
+    return np.asarray((vector / value[:, None, :]) @ vector.transpose(0, 2, 1), np.float32)
+
+
+def information(inverse: Float32Array, dc: FloatArray, *, band: slice, length: int) -> float:
+    """Return Fisher's information about a shift across the rows, for one column, per row²: Σ_f ½ tr(C⁻¹dC C⁻¹dC)."""
+    product = inverse.astype(np.float64) @ dc[band]
+    # bins of a real transform stand for two frequencies each
+    return float(np.einsum("fij,fji->", product, product) / length)
