@@ -8,20 +8,23 @@ the picture (`search`).
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from gramoscope.apparatus.bench import Bench, Stripe
 from gramoscope.camera.exposure import Exposure
-from gramoscope.conventions import FloatArray, IntArray, lateral_of_row_m
+from gramoscope.conventions import INNER, MICROMETRES_PER_METRE, FloatArray, IntArray, lateral_of_row_m
+from gramoscope.pickup.cartridge import Line, Sketch, Spread
 from gramoscope.pickup.centreline import Centreline, centroids, discard_damaged_columns, fill_voids
 from gramoscope.pickup.flow.derivatives import Derivatives, group_derivatives, texture_contrast
 from gramoscope.pickup.flow.horn_schunck import Flow, FlowMethod, GrooveHornSchunck
 from gramoscope.pickup.in_focus import InFocus
 from gramoscope.pickup.registration import Canvas, frame_shifts, register
 from gramoscope.pickup.search import HoughSearch, Segment, line_rows, line_slopes
-from gramoscope.pickup.stripes import StripeModel, kept_stripes
+from gramoscope.pickup.stripes import StripeModel, kept_stripes, walls_read
 from gramoscope.pickup.wall import Planes, WallOrientation, wall_angle_rad
 from gramoscope.pickup.wall_samples import WallSamples, samples_of_wall
 from gramoscope.quality import Quality, no_flags
@@ -120,6 +123,40 @@ class SeedPaperPickup:
         if not group.valid.any():
             return self._lost(group, exposure_flags)
         return self._read(group, exposure_flags).trace
+
+    def learning_groups(self, group_count: int) -> IntArray:
+        """Return none: the paper's reading knows beforehand what it looks for."""
+        return np.empty(0, np.int64)
+
+    def learn(
+        self,
+        group: Callable[[int], FrameGroup],
+        group_count: int,
+        spread: Spread,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> SeedPaperPickup:
+        """Return the cartridge as it is; see `pickup.cartridge.Cartridge`."""
+        return self
+
+    @property
+    def walls(self) -> tuple[str, ...]:
+        """The walls that the kept stripes make."""
+        return walls_read(self.bench)
+
+    @property
+    def calibration(self) -> Mapping[str, Any]:
+        """Nothing: wall angles and frame steps are told stretch by stretch."""
+        return {}
+
+    def sketch(self, group: FrameGroup) -> Sketch | None:
+        """Return one frame and the stripes that were found in it; None when no frame is usable."""
+        reading = self.inspect(group)
+        if reading is None:
+            return None
+        image = reading.group.images[int(np.flatnonzero(reading.group.valid)[0])]
+        width = image.shape[1]
+        lines = zip(reading.stripes, reading.centrelines, strict=True)
+        return Sketch(image, tuple(Line(_name(s), line.row[:width], line.measured[:width]) for s, line in lines))
 
     def inspect(self, group: FrameGroup) -> Reading | None:
         """Return everything that was seen on the way to a trace, None when no frame is usable."""
@@ -279,3 +316,9 @@ class SeedPaperPickup:
             flags=no_flags(2, stations) | np.uint16(flags | Quality.INTERPOLATED),
             problems=group.problems,
         )
+
+
+def _name(stripe: Stripe) -> str:
+    wall = "inner" if stripe.wall == INNER else "outer"
+    place = "through the glass" if stripe.through_glass else "beside the glass"
+    return f"{wall} wall, {stripe.depth_below_land_m * MICROMETRES_PER_METRE:.0f} µm deep, {place}"

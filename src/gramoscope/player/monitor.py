@@ -84,13 +84,13 @@ class Monitor:
         """Take note of a stretch that the pickup has read."""
         self.groups += 1
         self.frames_lost += frames_lost
-        read = np.isfinite(trace.slope) & ((trace.flags & np.uint16(NOT_MEASURED)) == 0)
+        read = np.isfinite(trace.offset_m) & ((trace.flags & np.uint16(NOT_MEASURED)) == 0)
         if not read.any():
             self.groups_lost.append(trace.number)
         self.problems_count += len(trace.problems)
         room = max(MOST_PROBLEMS - len(self.problems), 0)
         self.problems += [_with_group(problem, trace.number) for problem in trace.problems[:room]]
-        walls = np.isfinite(trace.slope).any(axis=1)
+        walls = np.isfinite(trace.offset_m).any(axis=1)
         if walls.any():
             flags = trace.flags[walls]
             self.pickup_samples += flags.size

@@ -19,13 +19,14 @@ from gramoscope.apparatus.capture import Capture
 from gramoscope.disc.characteristics import characteristic
 from gramoscope.disc.formats import direction_of_cut
 from gramoscope.errors import CaptureError, require
+from gramoscope.pickup.cartridge import Pickup
 from gramoscope.player.monitor import OVERVIEW_POINTS, Monitor
 from gramoscope.player.outputs import Outputs
 from gramoscope.player.picture import groove_picture
 from gramoscope.player.provenance import InputHashes, hash_group
 from gramoscope.player.recipe import Recipe
 from gramoscope.player.report import transfer_report
-from gramoscope.player.workers import in_order
+from gramoscope.player.workers import in_order, spreading
 from gramoscope.preamp.equalisation import Equaliser
 from gramoscope.preamp.resample import Resampler
 from gramoscope.signal_path import Audio, WallTrace
@@ -94,23 +95,42 @@ def play(
     hashes, monitor = InputHashes(), _monitor(capture, settings.rate_hz)
 
     with Outputs(folder, rate_hz=settings.rate_hz) as files:
-        traces = _picked_up(capture, recipe, settings.workers, hashes, monitor, progress)
+        pickup = learned(capture, recipe, settings.workers, progress=progress)
+        traces = _picked_up(capture, pickup, settings.workers, hashes, monitor, progress)
         spliced = _spliced(traces, recipe, monitor)
         motion = tonearm.follow(spliced)
         flat = _written(resampler.resample(motion), files, monitor)
         for piece in equaliser.equalise(flat):
             files.equalised.write(piece.samples)
         _require_sound(monitor)
-        report = transfer_report(capture, recipe, settings, hashes, monitor, files, time.perf_counter() - started)
-        files.finish(report, groove_picture(capture, recipe, monitor, settings.rate_hz))
+        report = transfer_report(
+            capture, recipe, pickup, settings, hashes, monitor, files, time.perf_counter() - started
+        )
+        picture = groove_picture(capture, pickup, monitor, rate_hz=settings.rate_hz, recipe_name=recipe.name)
+        files.finish(report, picture)
     return report
 
 
+def learned(capture: Capture, recipe: Recipe, workers: int, *, progress: Progress | None = None) -> Pickup:
+    """Return the recipe's cartridge, fitted to a capture, as it is after learning the passage.
+
+    Parameters
+    ----------
+    capture : Capture
+    recipe : Recipe
+    workers : int
+    progress : callable, optional
+        Told how much is learned, and of how much.
+    """
+    with spreading(workers) as spread:
+        cartridge = recipe.cartridge_for(capture.bench)
+        return cartridge.learn(capture.group, capture.group_count, spread, progress)
+
+
 def _picked_up(
-    capture: Capture, recipe: Recipe, workers: int, hashes: InputHashes, monitor: Monitor, progress: Progress | None
+    capture: Capture, pickup: Pickup, workers: int, hashes: InputHashes, monitor: Monitor, progress: Progress | None
 ) -> Iterator[WallTrace]:
-    """Read the stretches: the only part that runs in several threads."""
-    pickup = recipe.pickup_for(capture.bench)
+    """Read the stretches, several at a time."""
 
     def read(number: int) -> tuple[WallTrace, dict[str, str], int]:
         group = capture.group(number)

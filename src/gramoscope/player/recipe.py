@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import MISSING, asdict, dataclass, field, fields
+from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
 from difflib import get_close_matches
 from importlib import resources
 from pathlib import Path
@@ -17,28 +17,24 @@ from typing import Any, TypeVar, get_type_hints
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from gramoscope.apparatus.bench import Bench
-from gramoscope.camera.exposure import Exposure
 from gramoscope.errors import ArgumentError, require
+from gramoscope.pickup.cartridge import Cartridge
 from gramoscope.pickup.flow.horn_schunck import FlowMethod, GrooveHornSchunck, HornSchunck
-from gramoscope.pickup.in_focus import InFocus
-from gramoscope.pickup.search import HoughSearch
 from gramoscope.pickup.seed_paper import SeedPaperPickup
-from gramoscope.pickup.stripes import StripeModel
-from gramoscope.pickup.wall import WallOrientation
+from gramoscope.pickup.texture_likelihood import TextureLikelihood
 from gramoscope.preamp.resample import DEFAULT_PASSBAND
-from gramoscope.tonearm.follow import KalmanSmoother
+from gramoscope.tonearm.follow import KalmanSmoother, PlaceSmoother, Smoother
 from gramoscope.tonearm.splice import Splice
 
-DEFAULT_RECIPE = "seed-paper"
-CARTRIDGE = "seed-paper"
-_FLOWS: dict[str, type[FlowMethod]] = {"horn-schunck": HornSchunck, "groove-horn-schunck": GrooveHornSchunck}
-_PICKUP_PARTS = {
-    "exposure": Exposure,
-    "in_focus": InFocus,
-    "hough": HoughSearch,
-    "stripe_model": StripeModel,
-    "orientation": WallOrientation,
+DEFAULT_RECIPE = "best"
+_CARTRIDGES: dict[str, type[SeedPaperPickup] | type[TextureLikelihood]] = {
+    "seed-paper": SeedPaperPickup,
+    "texture-likelihood": TextureLikelihood,
 }
+_FLOWS: dict[str, type[FlowMethod]] = {"horn-schunck": HornSchunck, "groove-horn-schunck": GrooveHornSchunck}
+_SMOOTHERS: dict[str, type[KalmanSmoother] | type[PlaceSmoother]] = {"slopes": KalmanSmoother, "places": PlaceSmoother}
+# what a table that names none gets
+_CARTRIDGE, _FLOW, _SMOOTHER = "seed-paper", "groove-horn-schunck", "slopes"
 Part = TypeVar("Part")
 
 
@@ -49,24 +45,27 @@ class Recipe:
     Attributes
     ----------
     name, about : str
+    cartridge : str
+        "seed-paper" or "texture-likelihood".
     pickup : dict
-        Parameters of `SeedPaperPickup`, all but the bench.
+        Parameters of the cartridge, all but the bench.
     splice : Splice
-    smoother : KalmanSmoother
+    smoother : KalmanSmoother or PlaceSmoother
     passband : float
         Of the resampler.
     """
 
     name: str
     about: str = ""
+    cartridge: str = _CARTRIDGE
     pickup: Mapping[str, Any] = field(default_factory=dict)
     splice: Splice = field(default_factory=Splice)
-    smoother: KalmanSmoother = field(default_factory=KalmanSmoother)
+    smoother: Smoother = field(default_factory=KalmanSmoother)
     passband: float = DEFAULT_PASSBAND
 
-    def pickup_for(self, bench: Bench) -> SeedPaperPickup:
+    def cartridge_for(self, bench: Bench) -> Cartridge:
         """Return the cartridge, fitted to an apparatus."""
-        return SeedPaperPickup(bench, **self.pickup)
+        return _CARTRIDGES[self.cartridge](bench, **self.pickup)
 
 
 def shipped_recipes() -> tuple[str, ...]:
@@ -122,47 +121,70 @@ def recipe_of_table(table: Mapping[str, Any]) -> Recipe:
     pickup, tonearm, preamp = (_table(table, key) for key in ("pickup", "tonearm", "preamp"))
     _only(tonearm, ("splice", "smoother"), "[tonearm]")
     _only(preamp, ("passband",), "[preamp]")
+    name, parameters = _cartridge_of_table(pickup)
     return Recipe(
         name=_checked(str, table.get("name", "unnamed"), "name"),
         about=_checked(str, table.get("about", ""), "about"),
-        pickup=_pickup_of_table(pickup),
+        cartridge=name,
+        pickup=parameters,
         splice=build(Splice, _table(tonearm, "splice"), "[tonearm.splice]"),
-        smoother=build(KalmanSmoother, _table(tonearm, "smoother"), "[tonearm.smoother]"),
+        smoother=_chosen(_SMOOTHERS, _SMOOTHER, _table(tonearm, "smoother"), "[tonearm.smoother]"),
         passband=_checked(float, preamp.get("passband", DEFAULT_PASSBAND), "[preamp] passband"),
     )
 
 
 def table_of_recipe(recipe: Recipe) -> dict[str, Any]:
     """Return a recipe with every one of its parameters, those it left out included; `recipe_of_table` reads it back."""
-    cartridge = recipe.pickup_for(Bench())
-    pickup = asdict(cartridge)
-    del pickup["bench"]
-    method = next(name for name, kind in _FLOWS.items() if type(cartridge.flow) is kind)
+    cartridge = recipe.cartridge_for(Bench())
+    pickup: dict[str, Any] = {}
+    for parameter in _parameters(type(cartridge)):
+        value = getattr(cartridge, parameter)
+        if parameter == "flow":
+            pickup[parameter] = _table_of_chosen(_FLOWS, value)
+        else:
+            pickup[parameter] = asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
     return {
         "name": recipe.name,
         "about": recipe.about,
-        "pickup": {"cartridge": CARTRIDGE, **pickup, "flow": {"method": method, **pickup["flow"]}},
-        "tonearm": {"splice": asdict(recipe.splice), "smoother": asdict(recipe.smoother)},
+        "pickup": {"cartridge": recipe.cartridge, **pickup},
+        "tonearm": {"splice": asdict(recipe.splice), "smoother": _table_of_chosen(_SMOOTHERS, recipe.smoother)},
         "preamp": {"passband": recipe.passband},
     }
 
 
-def _pickup_of_table(table: Mapping[str, Any]) -> dict[str, Any]:
-    _only(table, ("cartridge", "smoothing_px", "flow", *_PICKUP_PARTS), "[pickup]")
-    cartridge = table.get("cartridge", CARTRIDGE)
-    if cartridge != CARTRIDGE:
-        raise ArgumentError(f"[pickup] cartridge = {cartridge!r}", f'"{CARTRIDGE}"')
-    parts: dict[str, Any] = {
-        name: build(kind, _table(table, name), f"[pickup.{name}]") for name, kind in _PICKUP_PARTS.items()
-    }
-    flow = dict(_table(table, "flow"))
-    method = flow.pop("method", "groove-horn-schunck")
-    if method not in _FLOWS:
-        raise ArgumentError(f"[pickup.flow] method = {method!r}", f"one of {', '.join(_FLOWS)}")
-    parts["flow"] = build(_FLOWS[method], flow, "[pickup.flow]")
-    if "smoothing_px" in table:
-        parts["smoothing_px"] = _checked(float, table["smoothing_px"], "[pickup] smoothing_px")
-    return parts
+def _parameters(kind: type[Any]) -> tuple[str, ...]:
+    return tuple(f.name for f in fields(kind) if f.name != "bench")
+
+
+def _cartridge_of_table(table: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
+    name = table.get("cartridge", _CARTRIDGE)
+    if name not in _CARTRIDGES:
+        raise ArgumentError(f"[pickup] cartridge = {name!r}", f"one of {', '.join(_CARTRIDGES)}")
+    kind = _CARTRIDGES[name]
+    _only(table, ("cartridge", *_parameters(kind)), "[pickup]")
+    hints = get_type_hints(kind)
+    built: dict[str, Any] = {}
+    for parameter in _parameters(kind):
+        if parameter == "flow":
+            built[parameter] = _chosen(_FLOWS, _FLOW, _table(table, parameter), "[pickup.flow]")
+        elif is_dataclass(hints[parameter]):
+            built[parameter] = build(hints[parameter], _table(table, parameter), f"[pickup.{parameter}]")
+        elif parameter in table:
+            built[parameter] = _checked(hints[parameter], table[parameter], f"[pickup] {parameter}")
+    return name, built
+
+
+def _chosen(kinds: Mapping[str, type[Part]], default: str, table: Mapping[str, Any], where: str) -> Part:
+    """Make the part that a table's `method` names."""
+    parameters = dict(table)
+    method = parameters.pop("method", default)
+    if method not in kinds:
+        raise ArgumentError(f"{where} method = {method!r}", f"one of {', '.join(kinds)}")
+    return build(kinds[method], parameters, where)
+
+
+def _table_of_chosen(kinds: Mapping[str, type[Any]], part: Any) -> dict[str, Any]:
+    return {"method": next(name for name, kind in kinds.items() if type(part) is kind), **asdict(part)}
 
 
 def build(kind: type[Part], table: Mapping[str, Any], where: str) -> Part:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from gramoscope.apparatus.capture import Capture
 from gramoscope.disc.formats import direction_of_cut
-from gramoscope.pickup.stripes import walls_read
+from gramoscope.pickup.cartridge import Pickup
 from gramoscope.player.monitor import Monitor
 from gramoscope.player.outputs import EQUALISED, FLAT, Outputs
 from gramoscope.player.provenance import InputHashes, bench_of, command_line, recipe_of, versions
@@ -23,6 +23,7 @@ REPORT_FORMAT = "gramoscope-report/1"
 def transfer_report(
     capture: Capture,
     recipe: Recipe,
+    pickup: Pickup,
     settings: Settings,
     hashes: InputHashes,
     monitor: Monitor,
@@ -40,8 +41,9 @@ def transfer_report(
         "seconds": seconds,
         "rate_hz": settings.rate_hz,
         "direction": direction_of_cut(capture.bench.disc.cut),
-        "walls_read": list(walls_read(capture.bench)),
-        "remarks": list(_remarks(capture)),
+        "walls_read": list(pickup.walls),
+        "remarks": list(_remarks(capture, pickup.walls)),
+        "calibration": dict(pickup.calibration),
         **monitor.as_dict(),
         "files": {
             FLAT: {
@@ -67,9 +69,9 @@ def transfer_report(
     }
 
 
-def _remarks(capture: Capture) -> tuple[str, ...]:
+def _remarks(capture: Capture, walls: tuple[str, ...]) -> tuple[str, ...]:
     """What a listener should know before judging."""
-    disc, walls = capture.bench.disc, walls_read(capture.bench)
+    disc = capture.bench.disc
     if len(walls) == 2:
         return ()
     if disc.cut == "stereo":

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import TypeVar
 
 from gramoscope.errors import require
+from gramoscope.pickup.cartridge import Spread
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
@@ -43,5 +45,22 @@ def in_order(work: Callable[[Task], Answer], tasks: Iterable[Task], *, workers: 
                 yield pending.popleft().result()
         while pending:
             yield pending.popleft().result()
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+@contextmanager
+def spreading(workers: int) -> Iterator[Spread]:
+    """Give a `map` that works in several threads, answers in order, while the block runs.
+
+    Parameters
+    ----------
+    workers : int
+        Threads.
+    """
+    require(workers >= 1, f"{workers} workers", "at least one")
+    pool = ThreadPoolExecutor(workers, thread_name_prefix="learning")
+    try:
+        yield pool.map
     finally:
         pool.shutdown(wait=True, cancel_futures=True)

@@ -18,7 +18,7 @@ from gramoscope.conventions import INNER, OUTER, FloatArray
 from gramoscope.disc.formats import Cut
 from gramoscope.errors import require
 from gramoscope.pickup.texture.layout import StripeLayout, wall_sign
-from gramoscope.pickup.texture.sharpness import CELL_PX, ridges
+from gramoscope.pickup.texture.sharpness import ridges
 
 BOTTOM_PX = 8.0
 """Nearer to the middle of the groove its rounded bottom leaves no wall to be sharp on."""
@@ -145,9 +145,7 @@ class GrooveSearch:
         path, _ = best_path(score, steps, costs)
         return lateral[path[0]].astype(np.float64), vertical[path[1]].astype(np.float64)
 
-    def _own_paths(
-        self, ridge: FloatArray, layout: StripeLayout, common: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
+    def _own_paths(self, ridge: FloatArray, layout: StripeLayout, common: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Let each wall look for its stripes, row by row, near the common path."""
         path, support = common.copy(), np.zeros_like(common)
         aside = np.arange(-int(self.wall_reach_px), int(self.wall_reach_px) + 1)

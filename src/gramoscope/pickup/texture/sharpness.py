@@ -79,7 +79,9 @@ def ridges(sharp: FloatArray, *, half_px: int = 3, flank_px: tuple[int, int] = (
         Mean over the ridge minus mean over both flanks; rows beyond the picture repeat the outermost.
     """
     near, far = flank_px
-    total = np.concatenate([np.zeros((sharp.shape[0], 1)), np.cumsum(np.pad(sharp, ((0, 0), (far, far)), mode="edge"), axis=1)], axis=1)
+    total = np.concatenate(
+        [np.zeros((sharp.shape[0], 1)), np.cumsum(np.pad(sharp, ((0, 0), (far, far)), mode="edge"), axis=1)], axis=1
+    )
     rows = np.arange(sharp.shape[1]) + far
 
     def mean(first: int, last: int) -> FloatArray:

@@ -135,9 +135,7 @@ class CrossSpectra:
         return np.asarray(fft.rfft(full, axis=0).real)
 
 
-def cross_spectra(
-    window: Float32Array, derivative: Float32Array, weight: Float32Array, *, length: int
-) -> CrossSpectra:
+def cross_spectra(window: Float32Array, derivative: Float32Array, weight: Float32Array, *, length: int) -> CrossSpectra:
     """Return the cross-spectra of one window, zero where its columns have no weight.
 
     Parameters
@@ -165,9 +163,7 @@ def _real_products(a: npt.NDArray[np.complex64], b: npt.NDArray[np.complex64]) -
     return np.asarray(left @ right)
 
 
-def precision(
-    c: FloatArray, *, band: slice, loading: float, smooth_bins: float = 16.0
-) -> Float32Array:
+def precision(c: FloatArray, *, band: slice, loading: float, smooth_bins: float = 16.0) -> Float32Array:
     """Return the inverse of C_f in a band, safe against what the sample could not tell.
 
     The least third of the eigenvalues of each C_f is noise; none is allowed below their mean (smoothed along f), and

@@ -1,0 +1,219 @@
+"""One stretch read by what the passage taught: where its walls run, column by column, and how surely.
+
+The path is improved in a few rounds of Fisher scoring. Each round lays windows about the present path of every stripe that
+can be seen, takes their scores, weights them by how far they can be trusted, and moves the walls by the smoothed ratio of
+score and information. Rounds go from forgiving models to exact ones, the very models that were learned while the passage's
+own paths improved in the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import ndimage
+
+from gramoscope.conventions import INNER, OUTER, BoolArray, FloatArray
+from gramoscope.disc.formats import Cut
+from gramoscope.pickup.texture.following import Float32Array, follow
+from gramoscope.pickup.texture.layout import StripeLayout
+from gramoscope.pickup.texture.likelihood import StripeStatistics, believable, quiet_power, scores, softened
+from gramoscope.pickup.texture.spectrum import Band, filtered
+
+BURNT_SHARE = 0.15
+"""Of the rows of a window in one column: a bright grain or two do no harm, a scratch does."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A stretch laid ready for reading.
+
+    Attributes
+    ----------
+    columns : float32 array, shape (column, row)
+        The registered picture, transposed.
+    usable : bool array, shape (column,)
+        Columns that rest on enough frames.
+    burnt : bool array, shape (column, row)
+        Places at full scale.
+    displacement_px : float64 array, shape (2, column)
+        The present path of each wall.
+    support : float64 array, shape (2, column)
+        Of the coarse search.
+    """
+
+    columns: Float32Array
+    usable: BoolArray
+    burnt: BoolArray
+    displacement_px: FloatArray
+    support: FloatArray
+
+    def moved(self, step_px: FloatArray) -> Stretch:
+        """Return the same stretch with its paths moved, shape (2, column)."""
+        return replace(self, displacement_px=self.displacement_px + step_px)
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """What the passage taught in one round of learning.
+
+    Attributes
+    ----------
+    layout : StripeLayout
+    whitener : float64 array
+    half_px : int
+        Rows of the windows on each side of a path.
+    band : Band
+    length : int
+        Of the transforms.
+    stripes : tuple of StripeStatistics or None
+        None for a stripe of which too little was seen.
+    """
+
+    layout: StripeLayout
+    whitener: FloatArray
+    half_px: int
+    band: Band
+    length: int
+    stripes: tuple[StripeStatistics | None, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What the stripes say about the walls, each column for itself.
+
+    Attributes
+    ----------
+    score, information : float64 arrays, shape (2, column)
+        Sums over the stripes of each wall, weighted so that the information is the inverse of the variance of
+        score/information; 0 where nothing was read.
+    surprise : float64 array, shape (2,)
+        Power of the score in this stretch over what was learned; 1 on average, NaN for a wall that was not read.
+    """
+
+    score: FloatArray
+    information: FloatArray
+    surprise: FloatArray
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What is read, and how paths are improved.
+
+    Parameters
+    ----------
+    power_limits : (float, float)
+        Columns with less or more texture than so many times the usual are damaged.
+    smooth_px : float
+        Standard deviation of the smoothing of steps in the direction of the cut: passes sound, stops noise.
+    smooth_other_px : float
+        The same for a direction that the cut does not use.
+    largest_step_px : float
+        In one round.
+    """
+
+    power_limits: tuple[float, float] = (0.2, 4.0)
+    smooth_px: float = 12.0
+    smooth_other_px: float = 200.0
+    largest_step_px: float = 1.0
+
+
+def windows(
+    stretch: Stretch, stripe_row: FloatArray, whitener: FloatArray, half_px: int
+) -> tuple[Float32Array, Float32Array]:
+    """Return the whitened window about a path and its derivative, shape (row, column)."""
+    window, derivative = follow(stretch.columns, stripe_row, half_px)
+    return filtered(window, whitener), filtered(derivative, whitener)
+
+
+def clear_columns(stretch: Stretch, stripe_row: FloatArray, visible: BoolArray, half_px: int) -> BoolArray:
+    """Tell in which columns a stripe can be seen whole, by enough frames and without burnt places."""
+    height = stretch.columns.shape[1]
+    rows = np.clip(np.round(stripe_row)[:, None].astype(np.int64) + np.arange(-half_px, half_px + 1), 0, height - 1)
+    burnt = stretch.burnt[np.arange(rows.shape[0])[:, None], rows].mean(axis=1) > BURNT_SHARE
+    return np.asarray(visible & stretch.usable & ~burnt)
+
+
+def evidence(stretch: Stretch, model: Model, rules: Rules) -> Evidence:
+    """Return what all stripes say about the present path of both walls."""
+    width = stretch.columns.shape[0]
+    score, information, surprise = np.zeros((2, width)), np.zeros((2, width)), np.zeros((2, 2))
+    rows = model.layout.rows(stretch.displacement_px)
+    visible = model.layout.visible(rows, half_px=model.half_px)
+    for row, seen, wall, statistics in zip(rows, visible, model.layout.wall, model.stripes, strict=True):
+        if statistics is None:
+            continue
+        clear = clear_columns(stretch, row, seen, model.half_px)
+        if not clear.any():
+            continue
+        window, derivative = windows(stretch, row, model.whitener, model.half_px)
+        clear &= believable(window, statistics.row_power, limits=rules.power_limits)
+        weight = softened(clear)
+        u = scores(window, derivative, weight, statistics.inverse, band=model.band, length=model.length)
+        weight64 = weight.astype(np.float64)
+        u = (u - statistics.mean_score) * statistics.trust
+        score[wall] += weight64 * u
+        information[wall] += weight64 * statistics.trust * statistics.information
+        power, columns = quiet_power(u, weight64)
+        surprise[wall] += power, columns * statistics.trust**2 * statistics.score_power
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return Evidence(score, information, surprise[:, 0] / surprise[:, 1])
+
+
+def step(found: Evidence, cut: Cut, rules: Rules) -> FloatArray:
+    """Return how far each wall should be moved, shape (2, column), pixels.
+
+    What both walls say together moves the groove in the direction of its cut, what they say against each other in the
+    other one, slowly. Where one wall is silent it goes along with the other.
+    """
+    if cut == "stereo":
+        return np.stack(
+            [_smoothed(found.score[w], found.information[w], rules.smooth_px, rules) for w in (INNER, OUTER)]
+        )
+    sign = np.array([[1.0], [1.0]]) if cut == "lateral" else np.array([[-1.0], [1.0]])
+    common = _smoothed((sign * found.score).sum(axis=0), found.information.sum(axis=0), rules.smooth_px, rules)
+    inner, outer = found.information
+    total = inner + outer
+    both = np.divide(4 * inner * outer, total, out=np.zeros_like(total), where=total > 0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        each = np.where(found.information > 0, sign * found.score / found.information, 0.0)
+    against = _smoothed(both * (each[OUTER] - each[INNER]) / 2, both, rules.smooth_other_px, rules)
+    return np.asarray(sign * (common + np.array([[-1.0], [1.0]]) * against))
+
+
+def settled(displacement_px: FloatArray, support: FloatArray, cut: Cut, rules: Rules) -> FloatArray:
+    """Return coarse paths without the jitter of single walls: the difference that the cut does not use is smoothed.
+
+    Parameters
+    ----------
+    displacement_px, support : float64 arrays, shape (2, column)
+        From the coarse search; the wall with the better support counts for more.
+    """
+    if cut == "stereo":
+        return displacement_px
+    sign = np.array([[1.0], [1.0]]) if cut == "lateral" else np.array([[-1.0], [1.0]])
+    signed = sign * displacement_px
+    weight = support**2 + 1e-4
+    inner, outer = weight
+    both = inner * outer / (inner + outer)
+    apart = ndimage.gaussian_filter1d(both * (signed[OUTER] - signed[INNER]) / 2, rules.smooth_other_px, mode="nearest")
+    apart = apart / ndimage.gaussian_filter1d(both, rules.smooth_other_px, mode="nearest")
+    middle = (weight * (signed + np.array([[1.0], [-1.0]]) * apart)).sum(axis=0) / weight.sum(axis=0)
+    return np.asarray(sign * (middle + np.array([[-1.0], [1.0]]) * apart))
+
+
+def _smoothed(score: FloatArray, information: FloatArray, smooth_px: float, rules: Rules) -> FloatArray:
+    most = float(information.max(initial=0.0))
+    if most == 0:
+        return np.zeros_like(score)
+    top = ndimage.gaussian_filter1d(score, smooth_px, mode="nearest")
+    bottom = ndimage.gaussian_filter1d(information, smooth_px, mode="nearest")
+    return np.clip(top / np.maximum(bottom, 0.05 * most), -rules.largest_step_px, rules.largest_step_px)
+
+
+def read(stretch: Stretch, models: Sequence[Model], cut: Cut, rules: Rules) -> tuple[Stretch, Evidence]:
+    """Return the stretch with its path improved by one round with each model, and the evidence about that path."""
+    for model in models:
+        stretch = stretch.moved(step(evidence(stretch, model, rules), cut, rules))
+    return stretch, evidence(stretch, models[-1], rules)

@@ -1,0 +1,308 @@
+"""The cartridge that reads walls by the likelihood of their texture: all stripes, both walls, an error bar for every sample.
+
+Frames are registered by their flow; a coarse search finds the groove in every stretch by itself; what neighbouring rows of
+the texture have to do with each other is learned from the passage, and says for every column of every stripe which way the
+path must move and how surely (`pickup.texture`). Nothing is known beforehand about the texture, the lens or the camera; of
+the manifest only where to look first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy import ndimage
+
+from gramoscope.apparatus.bench import Bench
+from gramoscope.camera.exposure import Exposure
+from gramoscope.conventions import INNER, FloatArray, IntArray
+from gramoscope.errors import require
+from gramoscope.pickup.cartridge import Line, Sketch, Spread
+from gramoscope.pickup.registration import Canvas, frame_shifts, register
+from gramoscope.pickup.texture.calibration import aligned_layout, calibration_of
+from gramoscope.pickup.texture.groove_search import GrooveSearch
+from gramoscope.pickup.texture.layout import StripeLayout
+from gramoscope.pickup.texture.learning import Learning
+from gramoscope.pickup.texture.reading import Evidence, Model, Rules, Stretch, read, settled
+from gramoscope.pickup.texture.sharpness import CELL_PX, sharpness
+from gramoscope.quality import Quality, no_flags
+from gramoscope.signal_path import FrameGroup, Texture, WallTrace
+
+STRIDE_PX = 8
+"""Columns whose evidence makes one sample."""
+NEARLY_WHITE = 0.97
+"""Points brighter than this share of full scale are burnt out."""
+SEARCH_MARGIN_PX = -16.0
+"""The coarse search looks for stripes so far beyond the glass edge: in the mixed zone they are faint, but there."""
+TEXTURE_REACH_PX = 40
+"""How far, beyond the nominal overlap, the strips reach that neighbouring stretches are matched by."""
+SURPRISE_LIMITS = (0.7, 9.0)
+"""A stretch whose scores are weaker or stronger than what was learned has its error bars changed by the root of it."""
+
+
+@dataclass(frozen=True)
+class TextureLikelihood:
+    """The cartridge before it knows a passage.
+
+    Parameters
+    ----------
+    bench : Bench
+        What the apparatus is.
+    learn_groups : int
+        From so many groups, spread over the passage, its texture is learned.
+    edge_margin_px : float
+        Stripes are not read nearer to the glass edge than this (beyond the window's own half height).
+    exposure, search, learning, rules
+        The steps; see each.
+    """
+
+    bench: Bench
+    learn_groups: int = 48
+    edge_margin_px: float = 6.0
+    exposure: Exposure = field(default_factory=Exposure)
+    search: GrooveSearch = field(default_factory=GrooveSearch)
+    learning: Learning = field(default_factory=Learning)
+    rules: Rules = field(default_factory=Rules)
+
+    def __post_init__(self) -> None:
+        require(self.learn_groups >= 1, f"learning from {self.learn_groups} groups", "at least one")
+
+    def learning_groups(self, group_count: int) -> IntArray:
+        """Return which groups of a passage are learned from."""
+        count = min(self.learn_groups, group_count)
+        return np.unique(np.round(np.linspace(0, group_count - 1, count)).astype(np.int64))
+
+    def learn(
+        self,
+        group: Callable[[int], FrameGroup],
+        group_count: int,
+        spread: Spread,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> TexturePickup:
+        """Return the cartridge as it is after learning a passage; see `pickup.cartridge.Cartridge`."""
+        numbers = self.learning_groups(group_count)
+        total = numbers.size * (2 + len(self.learning.loading))
+        done = 0
+
+        def told(count: int) -> None:
+            nonlocal done
+            done += count
+            if progress is not None:
+                progress(min(done, total), total)
+
+        laid = []
+        for one in spread(lambda number: self._laid(group(int(number))), numbers):
+            told(1)
+            if one is not None:
+                laid.append(one)
+        nominal = StripeLayout.of_bench(self.bench, edge_margin_px=SEARCH_MARGIN_PX)
+        unread = TexturePickup(self, nominal, ())
+        if not laid:
+            return unread
+        layout, stretches = aligned_layout(
+            [columns for columns, _, _ in laid], nominal, self.search, self.bench.disc.cut, spread
+        )
+        pickup = replace(unread, layout=layout)
+        prepared = list(spread(lambda i: pickup.stretch(*laid[i], found=stretches[i]), range(len(laid))))
+        told(numbers.size)
+        inner = StripeLayout.of_bench(self.bench, edge_margin_px=self.edge_margin_px).at(layout.rest_row)
+        learned, models = self.learning.learn(
+            prepared, inner, self.bench.disc.cut, self.rules, spread, lambda: told(numbers.size)
+        )
+        return replace(pickup, models=models, learned_from=len(learned))
+
+    def _laid(self, group: FrameGroup) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        group, _ = self.exposure.sort_out(group)
+        if not group.valid.any():
+            return None
+        canvas, _ = registered(group)
+        return laid_out(canvas, group.white_level)
+
+
+@dataclass(frozen=True, eq=False)
+class TexturePickup:
+    """The cartridge that knows its passage.
+
+    Attributes
+    ----------
+    cartridge : TextureLikelihood
+    layout : StripeLayout
+        Where the passage has its stripes.
+    models : tuple of Model
+        What it taught; empty when there was nothing to learn from.
+    learned_from : int
+        Groups.
+    """
+
+    cartridge: TextureLikelihood
+    layout: StripeLayout
+    models: tuple[Model, ...]
+    learned_from: int = 0
+
+    @property
+    def walls(self) -> tuple[str, ...]:
+        """Both walls."""
+        return ("inner", "outer")
+
+    @property
+    def calibration(self) -> Mapping[str, Any]:
+        """What the passage says about the apparatus, beside what the manifest says."""
+        return calibration_of(self.layout, self.models, self.cartridge.bench, self.learned_from)
+
+    def read(self, group: FrameGroup) -> WallTrace:
+        """Return where both walls of one stretch run.
+
+        Parameters
+        ----------
+        group : FrameGroup
+
+        Returns
+        -------
+        WallTrace
+            Offsets with their errors, every 8 columns; NaN and flags where a wall could not be read. Slopes are NaN.
+        """
+        group, exposure_flags = self.cartridge.exposure.sort_out(group)
+        if not group.valid.any() or not self.models:
+            return self._lost(group, exposure_flags)
+        canvas, step_m = registered(group)
+        stretch = self.stretch(*laid_out(canvas, group.white_level))
+        stretch, found = read(stretch, self.models, self.cartridge.bench.disc.cut, self.cartridge.rules)
+        head, tail = self._textures(group, canvas)
+        return replace(self._trace(group, stretch, found, exposure_flags, step_m), head=head, tail=tail)
+
+    def sketch(self, group: FrameGroup) -> Sketch | None:
+        """Return one frame and the stripes that were read in it; None when no frame is usable."""
+        group, _ = self.cartridge.exposure.sort_out(group)
+        if not group.valid.any() or not self.models:
+            return None
+        canvas, _ = registered(group)
+        stretch = self.stretch(*laid_out(canvas, group.white_level))
+        stretch, found = read(stretch, self.models, self.cartridge.bench.disc.cut, self.cartridge.rules)
+        image = group.images[int(np.flatnonzero(group.valid)[0])]
+        layout = self.models[-1].layout
+        rows = layout.rows(stretch.displacement_px)
+        visible = layout.visible(rows, half_px=self.models[-1].half_px)
+        lines = []
+        for number, wall in enumerate(layout.wall):
+            measured = visible[number] & (found.information[wall] > 0)
+            if self.models[-1].stripes[number] is not None:
+                name = f"{'inner' if wall == INNER else 'outer'} wall"
+                lines.append(Line(name, rows[number, : image.shape[1]], measured[: image.shape[1]]))
+        return Sketch(image, tuple(lines))
+
+    def stretch(
+        self,
+        columns: np.ndarray,
+        usable: np.ndarray,
+        burnt: np.ndarray,
+        found: tuple[FloatArray, FloatArray] | None = None,
+    ) -> Stretch:
+        """Lay a stretch ready: search the groove in it, if that was not done, and draw its paths column by column."""
+        cut = self.cartridge.bench.disc.cut
+        if found is None:
+            found = self.cartridge.search.find(sharpness(columns), self.layout, cut=cut)
+        x = np.arange(columns.shape[0])
+        cell = (np.arange(found[0].shape[1]) + 0.5) * CELL_PX - 0.5
+        path, support = (
+            np.array([np.interp(x, cell, ndimage.gaussian_filter1d(wall, 1.5, mode="nearest")) for wall in both])
+            for both in found
+        )
+        return Stretch(columns, usable, burnt, settled(path, support, cut, self.cartridge.rules), support)
+
+    def _trace(
+        self, group: FrameGroup, stretch: Stretch, found: Evidence, exposure_flags: Quality, step_m: FloatArray
+    ) -> WallTrace:
+        first = int(np.flatnonzero(group.valid)[0])
+        pitch = group.pixel_pitch_m
+        place_px, sigma_px = samples_of(stretch, found)
+        seen = np.isfinite(sigma_px)
+        flags = np.where(seen, np.uint16(exposure_flags), np.uint16(exposure_flags | UNSEEN)).astype(np.uint16)
+        nothing = np.full(place_px.shape, np.nan)
+        return WallTrace(
+            number=group.number,
+            arc_start_m=float(group.arc_start_m[first]) + 0.5 * (STRIDE_PX - 1) * pitch,
+            arc_step_m=pitch * STRIDE_PX,
+            offset_m=place_px * pitch + float(group.stage_m[first]),
+            offset_sigma_m=sigma_px * pitch,
+            slope=nothing,
+            slope_sigma=nothing,
+            correlation_samples=1.0,
+            flags=flags,
+            frame_step_m=step_m,
+            problems=group.problems,
+        )
+
+    def _textures(self, group: FrameGroup, canvas: Canvas) -> tuple[Texture | None, Texture | None]:
+        first = int(canvas.frame_index[0])
+        pitch = group.pixel_pitch_m
+        width = canvas.mean.shape[1]
+        overlap = width - round(self.cartridge.bench.sequence.group_step_m / pitch)
+        if overlap <= 0:
+            return None, None
+        length = min(overlap + TEXTURE_REACH_PX, width)
+        start, stage = float(group.arc_start_m[first]), float(group.stage_m[first])
+        head = ndimage.gaussian_filter(canvas.mean[:, :length], 1.0, order=(0, 1))
+        tail = ndimage.gaussian_filter(canvas.mean[:, width - length :], 1.0, order=(0, 1))
+        return (
+            Texture(head, start, pitch, stage),
+            Texture(tail, start + (width - length) * pitch, pitch, stage),
+        )
+
+    def _lost(self, group: FrameGroup, flags: Quality) -> WallTrace:
+        """A stretch of which nothing can be said."""
+        samples = group.images.shape[2] // STRIDE_PX
+        nothing = np.full((2, samples), np.nan)
+        return WallTrace(
+            number=group.number,
+            arc_start_m=float(group.arc_start_m[0]) + 0.5 * (STRIDE_PX - 1) * group.pixel_pitch_m,
+            arc_step_m=group.pixel_pitch_m * STRIDE_PX,
+            offset_m=nothing,
+            offset_sigma_m=nothing,
+            slope=nothing,
+            slope_sigma=nothing,
+            correlation_samples=1.0,
+            flags=no_flags(2, samples) | np.uint16(flags | UNSEEN),
+            problems=group.problems,
+        )
+
+
+UNSEEN = Quality.NO_STRIPE | Quality.INTERPOLATED
+
+
+def registered(group: FrameGroup) -> tuple[Canvas, FloatArray]:
+    """Return the valid frames of a group laid over each other, and the steps between them."""
+    shift_px, step_m = frame_shifts(group)
+    index = np.flatnonzero(group.valid)
+    images = group.images if index.size == group.images.shape[0] else group.images[index]
+    return register(images, shift_px, index), step_m
+
+
+def laid_out(canvas: Canvas, white_level: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a canvas column by column, which columns rest on enough frames, and what is burnt out."""
+    columns = np.ascontiguousarray(canvas.mean.T)
+    return columns, canvas.frames * 2 >= canvas.frames.max(), columns >= NEARLY_WHITE * white_level
+
+
+def samples_of(stretch: Stretch, found: Evidence) -> tuple[FloatArray, FloatArray]:
+    """Return place and standard error of each wall, one sample for every 8 columns.
+
+    Returns
+    -------
+    place_px, sigma_px : float64 arrays, shape (2, sample)
+        Displacement from rest; NaN where nothing was read.
+    """
+    samples = stretch.displacement_px.shape[1] // STRIDE_PX
+
+    def summed(values: FloatArray) -> FloatArray:
+        return np.asarray(values[:, : samples * STRIDE_PX].reshape(2, samples, STRIDE_PX).sum(axis=2))
+
+    information = summed(found.information)
+    moment = summed(found.information * stretch.displacement_px + found.score)
+    enough = information > 1e-3 * np.max(information, axis=1, keepdims=True, initial=1e-12)
+    surprise = np.clip(np.nan_to_num(found.surprise, nan=1.0), *SURPRISE_LIMITS)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        place = np.where(enough, moment / information, np.nan)
+        sigma = np.where(enough, np.sqrt(surprise[:, None] / information), np.nan)
+    return place, sigma
