@@ -3,18 +3,8 @@
 import numpy as np
 import pytest
 
-from gramoscope.simulation.disc_blur import (
-    COARSE,
-    LARGEST_PX,
-    PARTS,
-    PER_ROW,
-    SMALL,
-    TO_LARGE_PX,
-    TO_MIDDLE_PX,
-    blur,
-    grid,
-    scatter,
-)
+from gramoscope.simulation.blur_grids import COARSE, LARGEST_PX, PARTS, PER_ROW, SMALL, TO_LARGE_PX, TO_MIDDLE_PX, grid
+from gramoscope.simulation.disc_blur import blur, scatter
 
 TANGENT = 0.8554  # tan(asin 0.65)
 FLOOR_PX = 0.9

@@ -9,7 +9,7 @@ from gramoscope.conventions import rad
 from gramoscope.disc.groove import section
 from gramoscope.disc.texture import ACROSS, sample_across
 from gramoscope.microscope.illumination import Illumination
-from gramoscope.simulation.disc_blur import PER_ROW
+from gramoscope.simulation.blur_grids import PER_ROW
 from gramoscope.simulation.passage import Passage
 from gramoscope.simulation.render import cut_passage
 from gramoscope.simulation.rig import Rig

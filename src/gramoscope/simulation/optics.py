@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from gramoscope.conventions import FloatArray
 from gramoscope.disc.texture import Field
-from gramoscope.simulation.disc_blur import COARSE, LARGEST_PX, PER_ROW, blur
+from gramoscope.simulation.blur_grids import COARSE, LARGEST_PX, PER_ROW
+from gramoscope.simulation.disc_blur import blur
 from gramoscope.simulation.scene import Scene
 from gramoscope.simulation.surface import Strip
 

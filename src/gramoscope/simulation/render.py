@@ -14,7 +14,7 @@ from gramoscope.conventions import FloatArray
 from gramoscope.disc.cutting import cut_sound
 from gramoscope.disc.texture import Field
 from gramoscope.signal_path import ImageArray
-from gramoscope.simulation.disc_blur import COARSE, LARGEST_PX
+from gramoscope.simulation.blur_grids import COARSE, LARGEST_PX
 from gramoscope.simulation.optics import field_of, picture_of
 from gramoscope.simulation.passage import Passage
 from gramoscope.simulation.rig import FilmedGroup

@@ -16,7 +16,7 @@ from gramoscope.conventions import FloatArray, lateral_of_row_m
 from gramoscope.disc.damage import spoil_surface
 from gramoscope.disc.groove import section
 from gramoscope.disc.texture import ACROSS, PHASES, TAPS, Field, texel_weights
-from gramoscope.simulation.disc_blur import PER_ROW
+from gramoscope.simulation.blur_grids import PER_ROW
 from gramoscope.simulation.passage import Passage
 from gramoscope.simulation.scene import Scene
 
