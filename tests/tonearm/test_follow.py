@@ -12,7 +12,8 @@ from gramoscope.conventions import INNER
 from gramoscope.errors import ArgumentError
 from gramoscope.quality import Quality
 from gramoscope.signal_path import GrooveMotion, WallTrace
-from gramoscope.tonearm.follow import KalmanSmoother, Tonearm, grid_flags
+from gramoscope.tonearm.follow import KalmanSmoother, Tonearm
+from gramoscope.tonearm.grid_flags import grid_flags
 from gramoscope.turntable.rotation import Rotation
 
 STEP_M = 4e-6

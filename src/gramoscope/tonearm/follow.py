@@ -1,116 +1,45 @@
 """The tonearm: stretches in, the motion of the groove along the whole passage out, in bounded memory.
 
-Stretches are spliced, their walls turned into the direction of the cut, and the slopes of all of them smoothed together
-by a Kalman smoother (`tonearm.kalman`) that runs a few groups behind the pickup. What the smoother assumes of the music
-(how loud, how quickly it changes) it learns from the first groups and then keeps.
-
-The smoother sees the samples of overlapping stretches side by side, so an overlap counts twice where it was seen twice, and
-a gap is bridged by what surrounds it, with an error that grows to that of not knowing.
+It is given stretches where they really begin (`tonearm.splice`) and smooths all of them together by one of two methods:
+`KalmanSmoother` (`tonearm.slopes`) smooths the slopes of the direction that is listened to, `PlaceSmoother`
+(`tonearm.places`) the places of both walls and so both directions.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from itertools import chain, islice
+from typing import Protocol
 
-import numpy as np
-
-from gramoscope.conventions import BoolArray, FloatArray, IntArray
-from gramoscope.disc.formats import Direction
-from gramoscope.errors import require
-from gramoscope.quality import NOT_MEASURED, FlagArray, Quality
 from gramoscope.signal_path import GrooveMotion, WallTrace
-from gramoscope.tonearm.directions import Observations, observe
-from gramoscope.tonearm.kalman import Prior, State, learn_prior, rest, smooth
-from gramoscope.turntable.rotation import Rotation
+from gramoscope.tonearm.course import Course
+from gramoscope.tonearm.places import PlaceSmoother
+from gramoscope.tonearm.slopes import KalmanSmoother
+
+__all__ = ["KalmanSmoother", "PlaceSmoother", "Smoother", "Tonearm"]
+
+
+class Smoother(Protocol):
+    """A way to turn stretches into the motion of the groove."""
+
+    def follow(self, traces: Iterable[WallTrace], course: Course) -> Iterator[GrooveMotion]:
+        """See `Tonearm.follow`."""
+        ...
 
 
 @dataclass(frozen=True)
-class KalmanSmoother:
-    """How the tonearm smooths.
-
-    Parameters
-    ----------
-    learn_groups : int
-        The prior is learned from so many groups at the start.
-    block_groups : int
-        The smoother runs backwards each time so many groups have come.
-    lookahead : float
-        How far behind the newest sample it answers, in units of the prior's length 1/λ: what comes later changes the
-        answer by less than e^(−lookahead).
-    gate : float
-        A sample further than this many standard errors from its prediction is an outlier and gets no weight.
-    corner_limits_hz : (float, float)
-        Least and largest rate at which the music is believed to change, λV/2π.
-    floor_m_s : float
-        Least velocity (standard deviation) that the prior expects.
-    """
-
-    learn_groups: int = 64
-    block_groups: int = 16
-    lookahead: float = 20.0
-    gate: float = 5.0
-    corner_limits_hz: tuple[float, float] = (1000.0, 12000.0)
-    floor_m_s: float = 2e-3
-
-    def __post_init__(self) -> None:
-        require(self.learn_groups >= 1 and self.block_groups >= 1, "groups in a block are counted from 1", "1 or more")
-        require(self.lookahead > 0, f"a lookahead of {self.lookahead}", "above 0")
-        require(self.gate > 1, f"a gate of {self.gate} standard errors", "above 1")
-        low, high = self.corner_limits_hz
-        require(0 < self.floor_m_s <= 1, f"a floor of {self.floor_m_s} m/s", "above 0, at most 1")
-        require(0 < low < high, f"corner limits of {low} … {high} Hz", "two rising frequencies")
-
-
-@dataclass(frozen=True, eq=False)
-class _Buffer:
-    """Samples that were heard and not yet answered."""
-
-    arc_m: FloatArray
-    slope: FloatArray
-    variance: FloatArray
-    single: FloatArray
-    flags: FlagArray
-
-    @staticmethod
-    def empty() -> _Buffer:
-        return _Buffer(np.empty(0), np.empty(0), np.empty(0), np.empty(0), np.empty(0, np.uint16))
-
-    def with_stretch(self, seen: Observations, correlation_samples: float) -> _Buffer:
-        return _Buffer(
-            np.concatenate([self.arc_m, seen.arc_m]),
-            np.concatenate([self.slope, seen.slope]),
-            np.concatenate([self.variance, seen.variance * correlation_samples]),
-            np.concatenate([self.single, seen.variance]),
-            np.concatenate([self.flags, seen.flags]),
-        )
-
-    def part(self, keep: BoolArray | IntArray) -> _Buffer:
-        return _Buffer(self.arc_m[keep], self.slope[keep], self.variance[keep], self.single[keep], self.flags[keep])
-
-
-@dataclass(frozen=True)
-class Tonearm:
+class Tonearm(Course):
     """Follows the groove.
 
     Parameters
     ----------
-    rotation : Rotation
-        For the groove speed, which turns slopes into velocities.
-    direction : {"lateral", "vertical"}
-        What to listen to.
-    wall_angle_rad : float
-    passage_length_m : float
-        Where the passage ends, nominally; the last stretch may know better.
-    smoother : KalmanSmoother
+    rotation, direction, wall_angle_rad, passage_length_m
+        See `Course`.
+    smoother : KalmanSmoother or PlaceSmoother
+        How it smooths.
     """
 
-    rotation: Rotation
-    direction: Direction
-    wall_angle_rad: float
-    passage_length_m: float
-    smoother: KalmanSmoother = field(default_factory=KalmanSmoother)
+    smoother: Smoother = field(default_factory=KalmanSmoother)
 
     def follow(self, traces: Iterable[WallTrace]) -> Iterator[GrooveMotion]:
         """Turn spliced stretches into the motion of the groove.
@@ -118,144 +47,12 @@ class Tonearm:
         Parameters
         ----------
         traces : iterable of WallTrace
-            In the order of the passage, at the places where they really begin (`tonearm.splice`). Two blocks of them
+            In the order of the passage, at the places where they really begin (`tonearm.splice`). A few blocks of them
             are held at a time, the groups that the prior is learned from at first.
 
         Yields
         ------
         GrooveMotion
-            On one grid of `arc_step_m` from s = 0, without gap or overlap. The direction that is not listened to is NaN.
+            On one grid of `arc_step_m` from s = 0, without gap or overlap.
         """
-        stream = iter(traces)
-        first = list(islice(stream, self.smoother.learn_groups))
-        if not first:
-            return
-        prior = self._learn(first)
-        yield from self._blocks(chain(first, stream), prior, first[0].arc_step_m)
-
-    def _blocks(self, traces: Iterator[WallTrace], prior: Prior, step_m: float) -> Iterator[GrooveMotion]:
-        buffer, state, done, last = _Buffer.empty(), rest(prior, -1.0), 0, 0.0
-        trace = next(traces, None)
-        while trace is not None:
-            taken = 0
-            while trace is not None and taken < self.smoother.block_groups:
-                seen = observe(trace, self.direction, wall_angle_rad=self.wall_angle_rad)
-                buffer = buffer.with_stretch(seen, trace.correlation_samples)
-                last = max(last, float(seen.arc_m[-1]))
-                trace, taken = next(traces, None), taken + 1
-            heard = last if trace is None else trace.arc_start_m
-            end = (
-                max(last, self.passage_length_m)
-                if trace is None
-                else heard - self.smoother.lookahead / prior.rate_per_m
-            )
-            stop = int(np.floor(end / step_m)) + 1
-            if stop > done:
-                motion, state, outlier = self._answer(buffer, prior, state, done, stop, heard, step_m)
-                yield motion
-                buffer = _mark(buffer, outlier, heard)
-                buffer, done = buffer.part(buffer.arc_m > (stop - 1) * step_m - step_m), stop
-
-    def _answer(
-        self, buffer: _Buffer, prior: Prior, state: State, start: int, stop: int, heard: float, step_m: float
-    ) -> tuple[GrooveMotion, State, BoolArray]:
-        """Smooth everything heard beyond the last answer, and answer grid points start … stop − 1."""
-        grid: FloatArray = np.arange(start, stop, dtype=np.float64) * step_m
-        fresh = np.flatnonzero((buffer.arc_m > state.arc_m) & (buffer.arc_m <= heard))
-        arc = np.concatenate([buffer.arc_m[fresh], grid])
-        order = np.argsort(arc, kind="stable")
-        unseen = np.full(grid.size, np.nan)
-        result = smooth(
-            arc[order],
-            np.concatenate([buffer.slope[fresh], unseen])[order],
-            np.concatenate([buffer.variance[fresh], unseen])[order],
-            gate_variance=np.concatenate([buffer.single[fresh], unseen])[order],
-            prior=prior,
-            start=State(min(state.arc_m, float(arc[order][0])), state.mean, state.covariance),
-            gate=self.smoother.gate,
-            keep=int(np.flatnonzero(order == arc.size - 1)[0]),
-        )
-        place = np.argsort(order, kind="stable")
-        outlier = np.zeros(buffer.arc_m.size, np.bool_)
-        outlier[fresh] = result.outlier[place[: fresh.size]]
-        flags = grid_flags(grid, buffer.arc_m, np.where(outlier, buffer.flags | OUTLIER, buffer.flags), reach_m=step_m)
-        mine = place[fresh.size :]
-        return self._motion(grid, step_m, result.mean[mine], result.sigma[mine], flags), result.filtered, outlier
-
-    def _motion(
-        self, grid: FloatArray, step_m: float, slope: FloatArray, sigma: FloatArray, flags: FlagArray
-    ) -> GrooveMotion:
-        speed = self.rotation.speed_at_m_s(grid)
-        velocity, error, nothing = slope * speed, sigma * speed, np.full(grid.size, np.nan)
-        if self.direction == "lateral":
-            return GrooveMotion(float(grid[0]), step_m, velocity, error, nothing, nothing, flags)
-        return GrooveMotion(float(grid[0]), step_m, nothing, nothing, velocity, error, flags)
-
-    def _learn(self, traces: list[WallTrace]) -> Prior:
-        """Learn from samples so far apart that their errors are their own; the median over all ways to choose them."""
-        seen = [(observe(t, self.direction, wall_angle_rad=self.wall_angle_rad), t.correlation_samples) for t in traces]
-        step = int(np.ceil(max(correlation for _, correlation in seen)))
-        priors = [self._learn_from([one.thinned(step, first) for one, _ in seen]) for first in range(step)]
-        return Prior(
-            float(np.median([prior.sigma for prior in priors])),
-            float(np.median([prior.rate_per_m for prior in priors])),
-        )
-
-    def _learn_from(self, stretches: list[Observations]) -> Prior:
-        buffer = _Buffer.empty()
-        for seen in stretches:
-            buffer = buffer.with_stretch(seen, 1.0)
-        buffer = buffer.part(np.argsort(buffer.arc_m, kind="stable"))
-        speed = float(self.rotation.speed_at_m_s(0.0))
-        low, high = (2 * np.pi * corner / speed for corner in self.smoother.corner_limits_hz)
-        measured = (buffer.flags & np.uint16(NOT_MEASURED)) == 0
-        return learn_prior(
-            buffer.arc_m,
-            np.where(measured, buffer.slope, np.nan),
-            buffer.variance,
-            rate_limits_per_m=(low, high),
-            sigma_floor=self.smoother.floor_m_s / speed,
-        )
-
-
-OUTLIER = np.uint16(Quality.OUTLIER | Quality.INTERPOLATED)
-
-
-def _mark(buffer: _Buffer, outlier: BoolArray, heard: float) -> _Buffer:
-    """Outliers stay outliers when the next block looks at them again."""
-    flags = np.where(outlier & (buffer.arc_m <= heard), buffer.flags | OUTLIER, buffer.flags)
-    slope = np.where(outlier, np.nan, buffer.slope)
-    return _Buffer(buffer.arc_m, slope, buffer.variance, buffer.single, flags.astype(np.uint16))
-
-
-def grid_flags(grid: FloatArray, arc_m: FloatArray, flags: FlagArray, *, reach_m: float) -> FlagArray:
-    """Return the flags of places on a grid from those of the samples around them.
-
-    Parameters
-    ----------
-    grid : float64 array, shape (point,)
-        Rising.
-    arc_m, flags : arrays, shape (sample,)
-        In any order.
-    reach_m : float
-        Samples further away than this do not support a point.
-
-    Returns
-    -------
-    uint16 array, shape (point,)
-        Where a sample in reach was measured, the flags of the measured ones; elsewhere `INTERPOLATED` and all reasons
-        in reach.
-    """
-    order = np.argsort(arc_m, kind="stable")
-    arc, flag = arc_m[order], flags[order]
-    start, stop = np.searchsorted(arc, grid - reach_m), np.searchsorted(arc, grid + reach_m, side="right")
-    measured_flags, all_flags = np.zeros(grid.size, np.uint16), np.zeros(grid.size, np.uint16)
-    any_measured = np.zeros(grid.size, np.bool_)
-    for k in range(int((stop - start).max(initial=0))):
-        i = np.minimum(start + k, arc.size - 1)
-        here = start + k < stop
-        measured = here & ((flag[i] & np.uint16(NOT_MEASURED)) == 0)
-        any_measured |= measured
-        measured_flags |= np.where(measured, flag[i], 0).astype(np.uint16)
-        all_flags |= np.where(here, flag[i], 0).astype(np.uint16)
-    return np.where(any_measured, measured_flags, all_flags | np.uint16(Quality.INTERPOLATED)).astype(np.uint16)
+        return self.smoother.follow(traces, self)
