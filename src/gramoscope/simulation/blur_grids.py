@@ -113,6 +113,7 @@ SMALL = grid(1, 1, per_row=PARTS * PER_ROW, largest_px=TO_MIDDLE_PX[1] + 1, bins
 MIDDLE = grid(1, 4, per_row=1, largest_px=TO_LARGE_PX[1], bins_per_px=64)
 LARGE = grid(COARSE, COARSE, per_row=1, largest_px=LARGEST_PX, bins_per_px=16)
 # for the kernels
+SMALLS_LAST_BIN = SMALL.half.shape[1] - 1
 SMALL_BINS_PER_PX = SMALL.bins_per_px
 MIDDLE_ROWS, LARGE_ROWS = MIDDLE.tall_px * PER_ROW, LARGE.tall_px * PER_ROW
 
@@ -139,7 +140,7 @@ class Sources:
 def split(light: Picture, radius_px: Picture, slope_tan: Picture, floor_px: np.float32) -> tuple[Sources, ...]:
     """Divide points of light into those with small discs, on their own grid, and those with larger ones, in blocks."""
     shape = light.shape
-    small = Sources(np.empty((2, *shape), np.float32), np.zeros((PARTS, *shape), np.int16), np.empty(shape, np.float32))
+    small = Sources(np.empty((2, *shape), np.float32), np.empty((PARTS, *shape), np.int16), np.empty(shape, np.float32))
     middle, large = (
         np.zeros((4, shape[0] // (PER_ROW * on.tall_px), shape[1] // on.wide_px), np.float32) for on in (MIDDLE, LARGE)
     )
@@ -200,9 +201,9 @@ def _split_row(
         even[column] = small * share
         lit[column] = light[column] * even[column]
         ramp[column] = tilt * signed / square
-        for part in range(PARTS if small > 0 else 0):
+        for part in range(PARTS):
             aside = tilt * np.float32((part + 0.5) / PARTS - 0.5) / np.float32(PER_ROW)
-            bins[part, column] = _small_bin(signed + aside, floor_px)
+            bins[part, column] = _small_bin(signed + aside, floor_px) if small > 0 else SMALLS_LAST_BIN
         shares[0, column] = one - small - large
         shares[1, column] = large
 
