@@ -12,14 +12,15 @@ as grooves move, so it cannot lose the groove for good. Smoothed backwards, that
 what all others say, and by this it is accepted or rejected once more, for the second pass that counts. So what was rejected
 because the prediction was bad comes back.
 
-*The prior* is learned anew from every `learn_groups` groups: records begin in silence and get loud.
+*The prior* follows the loudness stretch by stretch (`tonearm.level`); its spectrum is learned anew from every `learn_groups`
+groups (`tonearm.learn_groove`): records begin in silence and get loud.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from itertools import chain, islice
+from itertools import chain, islice, tee
 from typing import get_args
 
 import numpy as np
@@ -31,16 +32,17 @@ from gramoscope.quality import FlagArray
 from gramoscope.signal_path import GrooveMotion, WallTrace
 from gramoscope.tonearm.course import Course
 from gramoscope.tonearm.grid_flags import OUTLIER, grid_flags
-from gramoscope.tonearm.groove_prior import SLOPE, STATES, GroovePrior, taylor
-from gramoscope.tonearm.learn_groove import PriorLimits, learn, one_direction, one_wall
+from gramoscope.tonearm.groove_prior import SLOPE, STATES, GroovePrior, start, taylor
+from gramoscope.tonearm.learn_groove import PriorLimits, learn, lesson
+from gramoscope.tonearm.level import OneDirection, bend_power, levels, one_direction, one_wall
 from gramoscope.tonearm.linear_gaussian import Moves, Readings, Smoothed, backward, forward
 from gramoscope.tonearm.stretches import Stretch, counted_from_the_start, handed_over, stretch_of
 
 DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
 ANYWHERE_M = 1e-3
 """How little is known of where a passage begins."""
-TEACHERS = 8
-"""So many stretches of those that a prior is learned from are looked at."""
+FIRST_TEACHERS, TEACHERS = 24, 8
+"""So many stretches of those that a prior is learned from are looked at, the first time and later."""
 BOTH_WALLS = 0.1
 """A stretch that shows both walls over less than this share teaches by its best wall alone."""
 UNOBSERVABLE = 0.95
@@ -66,19 +68,20 @@ class PlaceSmoother:
     corner_limits_hz, cutoff_limits_hz : (float, float)
         Least and largest corner λV/2π and cut-off μV/2π that the music may have.
     floor_m_s : float
-        Least velocity (standard deviation) that the prior expects of the direction that is listened to.
+        Least change of velocity over `BEND_M` (standard deviation) that the prior expects of the direction that is
+        listened to.
     other_floor_m_s : float
         The same of the other direction.
     """
 
     learn_groups: int = 64
-    block_groups: int = 16
+    block_groups: int = 64
     lookahead: float = 20.0
     gate: float = 5.0
     corner_limits_hz: tuple[float, float] = (300.0, 20_000.0)
-    cutoff_limits_hz: tuple[float, float] = (3_000.0, 60_000.0)
-    floor_m_s: float = 2e-3
-    other_floor_m_s: float = 2e-4
+    cutoff_limits_hz: tuple[float, float] = (1_000.0, 60_000.0)
+    floor_m_s: float = 3e-4
+    other_floor_m_s: float = 1e-4
 
     def __post_init__(self) -> None:
         require(self.learn_groups >= 1 and self.block_groups >= 1, "groups in a block are counted from 1", "1 or more")
@@ -125,32 +128,27 @@ class _Samples:
     flags: FlagArray
 
     @staticmethod
-    def empty() -> _Samples:
-        numbers = np.empty(0)
-        return _Samples(numbers, np.empty(0, np.int64), numbers, numbers, numbers, np.empty(0, np.uint16))
-
-    def with_stretch(self, stretch: Stretch) -> _Samples:
+    def of(stretch: Stretch) -> _Samples:
         keep = np.maximum(stretch.share, LEAST_SHARE)
         seen = np.where(stretch.share > LEAST_SHARE, stretch.place_m, np.nan)
-        walls = np.repeat(np.arange(2)[:, None], stretch.arc_m.size, axis=1)
-        new = _Samples(
+        return _Samples(
             np.broadcast_to(stretch.arc_m, seen.shape).ravel(order="F"),
-            walls.ravel(order="F"),
+            np.tile(np.arange(2), stretch.arc_m.size),
             seen.ravel(order="F"),
             (stretch.variance * stretch.correlation_samples / keep).ravel(order="F"),
             stretch.variance.ravel(order="F"),
             stretch.flags.ravel(order="F"),
         )
-        return self.joined(new)
 
-    def joined(self, new: _Samples) -> _Samples:
+    @staticmethod
+    def joined(pieces: list[_Samples]) -> _Samples:
         return _Samples(
-            np.concatenate([self.arc_m, new.arc_m]),
-            np.concatenate([self.wall, new.wall]),
-            np.concatenate([self.place_m, new.place_m]),
-            np.concatenate([self.variance, new.variance]),
-            np.concatenate([self.gate_variance, new.gate_variance]),
-            np.concatenate([self.flags, new.flags]),
+            np.concatenate([piece.arc_m for piece in pieces]),
+            np.concatenate([piece.wall for piece in pieces]),
+            np.concatenate([piece.place_m for piece in pieces]),
+            np.concatenate([piece.variance for piece in pieces]),
+            np.concatenate([piece.gate_variance for piece in pieces]),
+            np.concatenate([piece.flags for piece in pieces]),
         )
 
     def part(self, keep: BoolArray | IntArray) -> _Samples:
@@ -170,6 +168,7 @@ class _Model:
 
     from_bin: int
     priors: tuple[GroovePrior, ...]
+    sigma: FloatArray
     a: FloatArray
     q: FloatArray
 
@@ -197,53 +196,71 @@ class _PlaceFollower:
         return np.array([-1.0, 1.0]) / np.tan(self.course.wall_angles_rad)
 
     def taught(self, stretches: Iterator[Stretch]) -> Iterator[tuple[Stretch, _Model]]:
-        """Return each stretch with the model of the batch it belongs to."""
+        """Return each stretch with what is believed of it."""
+        one, other = tee(stretches)
+        levelled = zip(one, levels(self._powers(stretch) for stretch in other), strict=True)
         before: tuple[GroovePrior | None, ...] = (None, None)
-        while batch := list(islice(stretches, self.smoother.learn_groups)):
-            before = priors = tuple(self._learn(batch, d, prior) for d, prior in zip(DIRECTIONS, before, strict=True))
+        while batch := [
+            (stretch, np.maximum(level, self._floor(stretch)))
+            for stretch, level in islice(levelled, self.smoother.learn_groups)
+        ]:
+            before = priors = tuple(self._learn(batch, i, prior) for i, prior in enumerate(before))
             steps = [prior.steps(self.step_m) for prior in priors]
-            model = _Model(
-                self._bin(batch[0].arc_m[0]), priors, np.stack([a for a, _ in steps]), np.stack([q for _, q in steps])
-            )
-            yield from ((stretch, model) for stretch in batch)
+            a, q = np.stack([a for a, _ in steps]), np.stack([q for _, q in steps])
+            unit = np.array([prior.sigma(1.0, self.step_m) for prior in priors])
+            for stretch, level in batch:
+                q_here = (unit * level)[:, None, None] ** 2 * q
+                yield stretch, _Model(self._bin(float(stretch.arc_m[0])), priors, unit * level, a, q_here)
 
-    def _learn(self, batch: list[Stretch], direction: Direction, before: GroovePrior | None) -> GroovePrior:
-        count = min(TEACHERS, len(batch))
+    def _floor(self, stretch: Stretch) -> FloatArray:
+        floors = [
+            self.smoother.floor_m_s if direction == self.course.direction else self.smoother.other_floor_m_s
+            for direction in DIRECTIONS
+        ]
+        return np.array(floors) / self.course.rotation.speed_at_m_s(stretch.arc_m[0])
+
+    def _powers(self, stretch: Stretch) -> FloatArray:
+        return np.array([bend_power(self._seen(stretch, direction)) for direction in DIRECTIONS])
+
+    def _seen(self, stretch: Stretch, direction: Direction) -> OneDirection:
+        seen = one_direction(stretch, direction, self.gains)
+        if direction == self.course.direction and seen.known < BOTH_WALLS * stretch.arc_m.size:
+            return one_wall(stretch, direction, self.gains)
+        return seen
+
+    def _learn(
+        self, batch: list[tuple[Stretch, FloatArray]], direction: int, before: GroovePrior | None
+    ) -> GroovePrior:
+        count = min(FIRST_TEACHERS if before is None else TEACHERS, len(batch))
         teachers = [batch[i] for i in np.linspace(0, len(batch) - 1, count).round().astype(int)]
-        courses = []
-        for stretch in teachers:
-            seen = one_direction(stretch, direction, self.gains)
-            if direction == self.course.direction and seen.known < BOTH_WALLS * stretch.arc_m.size:
-                seen = one_wall(stretch, direction, self.gains)
-            courses.append(seen)
-        return learn(courses, self.step_m, self._limits(direction, teachers[0].arc_m[0]), start=before)
+        name = DIRECTIONS[direction]
+        lessons = [lesson(self._seen(stretch, name), float(level[direction])) for stretch, level in teachers]
+        limits = self._limits(float(batch[0][0].arc_m[0]))
+        return learn([one for one in lessons if one is not None], self.step_m, limits, before=before)
 
-    def _limits(self, direction: Direction, arc_m: float) -> PriorLimits:
-        speed = float(self.course.rotation.speed_at_m_s(arc_m))
-        smoother = self.smoother
-        floor = smoother.floor_m_s if direction == self.course.direction else smoother.other_floor_m_s
-        corner, cutoff = (
-            (2 * np.pi * low / speed, 2 * np.pi * high / speed)
-            for low, high in (smoother.corner_limits_hz, smoother.cutoff_limits_hz)
-        )
-        return PriorLimits((floor / speed, 1.0), corner, cutoff)
+    def _limits(self, arc_m: float) -> PriorLimits:
+        per_hz = 2 * np.pi / float(self.course.rotation.speed_at_m_s(arc_m))
+        (low, high), (lowest, highest) = self.smoother.corner_limits_hz, self.smoother.cutoff_limits_hz
+        return PriorLimits((per_hz * low, per_hz * high), (per_hz * lowest, per_hz * highest))
 
     def _bin(self, arc_m: float) -> int:
         return int(np.rint(arc_m / self.step_m))
 
     def blocks(self, stretches: Iterator[tuple[Stretch, _Model]]) -> Iterator[GrooveMotion]:
         """Answer bin after bin, some way behind the newest stretch."""
-        samples, models, done, last, state = _Samples.empty(), list[_Model](), 0, 0, None
+        pieces, models, done, last, state = list[_Samples](), list[_Model](), 0, 0, None
         current = next(stretches, None)
         while current is not None:
             taken = 0
             while current is not None and taken < self.smoother.block_groups:
                 stretch, model = current
-                samples, last = samples.with_stretch(stretch), max(last, self._bin(stretch.arc_m[-1]))
+                last = max(last, self._bin(stretch.arc_m[-1]))
+                pieces.append(_Samples.of(stretch))
                 models = models if models and models[-1] is model else [*models, model]
                 current, taken = next(stretches, None), taken + 1
+            samples = _Samples.joined(pieces)
             if state is None:
-                state = self._start(models[0], min(0, self._bin(samples.arc_m[0])))
+                state = self._start(models[0], min(0, self._bin(float(samples.arc_m[0]))))
             if current is None:
                 heard = max(last, int(np.floor(self.course.passage_length_m / self.step_m)))
                 stop = heard + 1
@@ -252,6 +269,7 @@ class _PlaceFollower:
                 stop = heard + 1 - self._lookahead(models)
             if stop > done:
                 motion, state, samples = self._answer(samples, models, state, (done, stop, heard + 1))
+                pieces = [samples]
                 yield motion
                 models = [m for m, after in zip(models, [*models[1:], None], strict=True) if not _over(after, stop)]
                 done = stop
@@ -264,7 +282,8 @@ class _PlaceFollower:
         covariance = np.zeros((2 * STATES, 2 * STATES))
         for i, prior in enumerate(model.priors):
             part = slice(i * STATES, (i + 1) * STATES)
-            covariance[part, part] = prior.rest(self.step_m, place_sigma_m=ANYWHERE_M)
+            resting = prior.at_rest(self.step_m)
+            covariance[part, part] = start(resting, float(model.sigma[i]), place_sigma_m=ANYWHERE_M)
         mean = np.zeros(2 * STATES)
         return _State(first, (mean, mean), (covariance, covariance))
 
@@ -303,8 +322,7 @@ class _PlaceFollower:
     def _two_passes(
         self, moves: Moves, readings: Readings, state: _State, stop: int
     ) -> tuple[Smoothed, _State, BoolArray]:
-        gate, wanted = self.smoother.gate, np.zeros((2, 2 * STATES))
-        wanted[0, SLOPE] = wanted[1, STATES + SLOPE] = 1.0
+        gate, wanted = self.smoother.gate, np.array([SLOPE, STATES + SLOPE])
         first = forward(moves, readings, mean=state.mean[0], covariance=state.covariance[0], gate=gate)
         accepted = backward(moves, readings, first, wanted=wanted[:0]).distance <= gate
         second = forward(moves, readings, mean=state.mean[1], covariance=state.covariance[1], allowed=accepted)
@@ -340,5 +358,4 @@ def _moves(models: list[_Model], bins: IntArray) -> Moves:
 
 
 def _prior_sigma(models: list[_Model], bins: IntArray) -> FloatArray:
-    sigma = np.array([[prior.sigma for prior in model.priors] for model in models])
-    return np.asarray(sigma[_which(models, bins)])
+    return np.stack([model.sigma for model in models])[_which(models, bins)]

@@ -33,6 +33,8 @@ class Stretch:
     share : float64 array, shape (2, sample)
         0 … 1, how much of its information each sample keeps.
     flags : uint16 array, shape (2, sample)
+    step_m : float
+        From one sample to the next.
     correlation_samples : float
         See `WallTrace`.
     """
@@ -42,6 +44,7 @@ class Stretch:
     variance: FloatArray
     share: FloatArray
     flags: FlagArray
+    step_m: float
     correlation_samples: float
 
 
@@ -55,6 +58,7 @@ def stretch_of(trace: WallTrace) -> Stretch:
         variance=np.where(seen, trace.offset_sigma_m**2, np.nan),
         share=np.ones(trace.flags.shape),
         flags=np.where(seen, trace.flags, trace.flags | np.uint16(NOT_MEASURED)).astype(np.uint16),
+        step_m=trace.arc_step_m,
         correlation_samples=trace.correlation_samples,
     )
 
@@ -92,8 +96,7 @@ def _hand_over(before: Stretch, after: Stretch) -> tuple[Stretch, Stretch]:
 
 def _faded(stretch: Stretch, fade: FloatArray, other: Stretch) -> Stretch:
     """The stretch with its share lowered wherever the other saw the same wall."""
-    step = stretch.arc_m[1] - stretch.arc_m[0] if stretch.arc_m.size > 1 else 1.0
-    nearest = np.rint((stretch.arc_m - other.arc_m[0]) / step).astype(np.int64)
+    nearest = np.rint((stretch.arc_m - other.arc_m[0]) / stretch.step_m).astype(np.int64)
     there = (nearest >= 0) & (nearest < other.arc_m.size)
     seen = np.isfinite(other.place_m[:, np.clip(nearest, 0, other.arc_m.size - 1)]) & there
     return replace(stretch, share=np.where(seen, stretch.share * np.clip(fade, 0.0, 1.0), stretch.share))
