@@ -24,8 +24,8 @@ from gramoscope.pickup.registration import Canvas, frame_shifts, register
 from gramoscope.pickup.texture.calibration import aligned_layout, calibration_of
 from gramoscope.pickup.texture.groove_search import GrooveSearch
 from gramoscope.pickup.texture.layout import StripeLayout
-from gramoscope.pickup.texture.learning import Learning
-from gramoscope.pickup.texture.reading import Evidence, Model, Rules, Stretch, read, settled
+from gramoscope.pickup.texture.learning import Learning, Lesson
+from gramoscope.pickup.texture.reading import Evidence, Rules, Stretch, read, settled
 from gramoscope.pickup.texture.sharpness import CELL_PX, sharpness
 from gramoscope.quality import Quality, no_flags
 from gramoscope.signal_path import FrameGroup, Texture, WallTrace
@@ -59,7 +59,7 @@ class TextureLikelihood:
     """
 
     bench: Bench
-    learn_groups: int = 48
+    learn_groups: int = 64
     edge_margin_px: float = 6.0
     exposure: Exposure = field(default_factory=Exposure)
     search: GrooveSearch = field(default_factory=GrooveSearch)
@@ -92,13 +92,14 @@ class TextureLikelihood:
             if progress is not None:
                 progress(min(done, total), total)
 
-        laid = []
-        for one in spread(lambda number: self._laid(group(int(number))), numbers):
+        laid, seen = [], []
+        for number, one in zip(numbers, spread(lambda n: self._laid(group(int(n))), numbers), strict=True):
             told(1)
             if one is not None:
                 laid.append(one)
+                seen.append(int(number))
         nominal = StripeLayout.of_bench(self.bench, edge_margin_px=SEARCH_MARGIN_PX)
-        unread = TexturePickup(self, nominal, ())
+        unread = TexturePickup(self, nominal)
         if not laid:
             return unread
         layout, stretches = aligned_layout(
@@ -108,10 +109,11 @@ class TextureLikelihood:
         prepared = list(spread(lambda i: pickup.stretch(*laid[i], found=stretches[i]), range(len(laid))))
         told(numbers.size)
         inner = StripeLayout.of_bench(self.bench, edge_margin_px=self.edge_margin_px).at(layout.rest_row)
-        learned, models = self.learning.learn(
+        lessons = self.learning.learn(
             prepared, inner, self.bench.disc.cut, self.rules, spread, lambda: told(numbers.size)
         )
-        return replace(pickup, models=models, learned_from=len(learned))
+        fold = {number: i % self.learning.folds for i, number in enumerate(seen)}
+        return replace(pickup, lessons=lessons, fold=fold)
 
     def _laid(self, group: FrameGroup) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
         group, _ = self.exposure.sort_out(group)
@@ -130,16 +132,16 @@ class TexturePickup:
     cartridge : TextureLikelihood
     layout : StripeLayout
         Where the passage has its stripes.
-    models : tuple of Model
+    lessons : tuple of Lesson
         What it taught; empty when there was nothing to learn from.
-    learned_from : int
-        Groups.
+    fold : mapping
+        Number of a group that was learned from → its fold.
     """
 
     cartridge: TextureLikelihood
     layout: StripeLayout
-    models: tuple[Model, ...]
-    learned_from: int = 0
+    lessons: tuple[Lesson, ...] = ()
+    fold: Mapping[int, int] = field(default_factory=dict)
 
     @property
     def walls(self) -> tuple[str, ...]:
@@ -149,7 +151,8 @@ class TexturePickup:
     @property
     def calibration(self) -> Mapping[str, Any]:
         """What the passage says about the apparatus, beside what the manifest says."""
-        return calibration_of(self.layout, self.models, self.cartridge.bench, self.learned_from)
+        last = self.lessons[-1].whole if self.lessons else None
+        return calibration_of(self.layout, last, self.cartridge.bench, len(self.fold))
 
     def read(self, group: FrameGroup) -> WallTrace:
         """Return where both walls of one stretch run.
@@ -164,30 +167,28 @@ class TexturePickup:
             Offsets with their errors, every 8 columns; NaN and flags where a wall could not be read. Slopes are NaN.
         """
         group, exposure_flags = self.cartridge.exposure.sort_out(group)
-        if not group.valid.any() or not self.models:
+        if not group.valid.any() or not self.lessons:
             return self._lost(group, exposure_flags)
         canvas, step_m = registered(group)
-        stretch = self.stretch(*laid_out(canvas, group.white_level))
-        stretch, found = read(stretch, self.models, self.cartridge.bench.disc.cut, self.cartridge.rules)
+        stretch, found = self._read(canvas, group)
         head, tail = self._textures(group, canvas)
         return replace(self._trace(group, stretch, found, exposure_flags, step_m), head=head, tail=tail)
 
     def sketch(self, group: FrameGroup) -> Sketch | None:
         """Return one frame and the stripes that were read in it; None when no frame is usable."""
         group, _ = self.cartridge.exposure.sort_out(group)
-        if not group.valid.any() or not self.models:
+        if not group.valid.any() or not self.lessons:
             return None
-        canvas, _ = registered(group)
-        stretch = self.stretch(*laid_out(canvas, group.white_level))
-        stretch, found = read(stretch, self.models, self.cartridge.bench.disc.cut, self.cartridge.rules)
+        stretch, found = self._read(registered(group)[0], group)
         image = group.images[int(np.flatnonzero(group.valid)[0])]
-        layout = self.models[-1].layout
+        model = self.lessons[-1].whole
+        layout = model.layout
         rows = layout.rows(stretch.displacement_px)
-        visible = layout.visible(rows, half_px=self.models[-1].half_px)
+        visible = layout.visible(rows, half_px=model.half_px)
         lines = []
         for number, wall in enumerate(layout.wall):
             measured = visible[number] & (found.information[wall] > 0)
-            if self.models[-1].stripes[number] is not None:
+            if model.stripes[number] is not None:
                 name = f"{'inner' if wall == INNER else 'outer'} wall"
                 lines.append(Line(name, rows[number, : image.shape[1]], measured[: image.shape[1]]))
         return Sketch(image, tuple(lines))
@@ -210,6 +211,12 @@ class TexturePickup:
             for both in found
         )
         return Stretch(columns, usable, burnt, settled(path, support, cut, self.cartridge.rules), support)
+
+    def _read(self, canvas: Canvas, group: FrameGroup) -> tuple[Stretch, Evidence]:
+        fold = self.fold.get(group.number)
+        models = [lesson.whole if fold is None else lesson.without[fold] for lesson in self.lessons]
+        stretch = self.stretch(*laid_out(canvas, group.white_level))
+        return read(stretch, models, self.cartridge.bench.disc.cut, self.cartridge.rules)
 
     def _trace(
         self, group: FrameGroup, stretch: Stretch, found: Evidence, exposure_flags: Quality, step_m: FloatArray

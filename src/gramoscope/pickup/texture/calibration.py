@@ -84,14 +84,15 @@ def _peak(values: FloatArray) -> float:
     return i + (float(0.5 * (values[i - 1] - values[i + 1]) / bend) if bend < 0 else 0.0)
 
 
-def calibration_of(layout: StripeLayout, models: Sequence[Model], bench: Bench, groups: int) -> dict[str, Any]:
+def calibration_of(layout: StripeLayout, model: Model | None, bench: Bench, groups: int) -> dict[str, Any]:
     """Return what was learned beside what the manifest says, as plain numbers.
 
     Parameters
     ----------
     layout : StripeLayout
         As it was found.
-    models : sequence of Model
+    model : Model or None
+        What the last round taught.
     bench : Bench
     groups : int
         Learned from.
@@ -103,7 +104,7 @@ def calibration_of(layout: StripeLayout, models: Sequence[Model], bench: Bench, 
         inner, outer = (np.sort(one.rest_row[one.wall == wall]) for wall in (INNER, OUTER))
         distances[name] = {
             "between_walls_um": float((inner.min() - outer.max()) * pitch_um) if inner.size and outer.size else None,
-            "between_planes_um": _between_planes_um(one, models, pitch_um),
+            "between_planes_um": _between_planes_um(one, model, pitch_um),
         }
     step_um = distances["measured"]["between_planes_um"]
     told: dict[str, Any] = {"groups": groups, "stripe_distances": distances}
@@ -115,15 +116,15 @@ def calibration_of(layout: StripeLayout, models: Sequence[Model], bench: Bench, 
             "manifest": float(np.rad2deg(bench.disc.wall_angle_rad)),
             "if_the_glass_is_as_stated": float(np.rad2deg(np.arctan2(shift_um, step_um))),
         }
-    told["stripes"] = [_stripe(models[-1], number, pitch_um) for number in range(layout.wall.size)] if models else []
+    told["stripes"] = [_stripe(model, number, pitch_um) for number in range(layout.wall.size)] if model else []
     return told
 
 
-def _between_planes_um(layout: StripeLayout, models: Sequence[Model], pitch_um: float) -> float | None:
+def _between_planes_um(layout: StripeLayout, model: Model | None, pitch_um: float) -> float | None:
     """Distance of the two stripes of the wall that shows both, by which the glass is measured."""
     for wall in (INNER, OUTER):
         mine = np.flatnonzero(layout.wall == wall)
-        if mine.size == 2 and (not models or all(models[-1].stripes[i] is not None for i in mine)):
+        if mine.size == 2 and (model is None or all(model.stripes[i] is not None for i in mine)):
             return float(np.ptp(layout.rest_row[mine]) * pitch_um)
     return None
 

@@ -11,15 +11,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import reduce
 
 import numpy as np
 from scipy import fft
 
-from gramoscope.conventions import FloatArray
+from gramoscope.conventions import FloatArray, IntArray
 from gramoscope.disc.formats import Cut
 from gramoscope.errors import require
 from gramoscope.pickup.cartridge import Spread
+from gramoscope.pickup.texture.following import Float32Array
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.likelihood import StripeStatistics, believable, quiet_power, scores, softened
 from gramoscope.pickup.texture.reading import Model, Rules, Stretch, clear_columns, evidence, step, windows
@@ -27,10 +27,25 @@ from gramoscope.pickup.texture.spectrum import (
     Band,
     CrossSpectra,
     cross_spectra,
-    information,
     precision,
     whitening_filter,
 )
+
+
+@dataclass(frozen=True, eq=False)
+class Lesson:
+    """What one round taught.
+
+    Attributes
+    ----------
+    whole : Model
+        From all groups, for those that were not among them.
+    without : tuple of Model
+        Without each fold, for the groups of that fold.
+    """
+
+    whole: Model
+    without: tuple[Model, ...]
 
 
 @dataclass(frozen=True)
@@ -42,24 +57,28 @@ class Learning:
     half_px : int
         Rows of a window on each side of a stripe.
     largest_lag_px : int
-        Lags up to here may carry correlation: two blur discs at the window's edge and a grain.
+        Lags up to here may carry correlation: the light of points far from the stripe reaches its rows in large discs.
     band_low, band_high : float
         Frequencies along the groove that are used, cycles a pixel.
     loading : tuple of float
         Of each round; see `spectrum.precision`.
     least_columns : int
         A stripe seen in fewer columns is not read.
+    folds : int
+        Parts of the learning groups, each read by what the others taught; 2 or more.
     """
 
     half_px: int = 12
-    largest_lag_px: int = 60
+    largest_lag_px: int = 150
     band_low: float = 0.02
     band_high: float = 0.35
-    loading: tuple[float, ...] = (0.03, 0.03, 0.01, 0.003, 0.001, 0.0, 0.0, 0.0)
+    loading: tuple[float, ...] = (0.03, 0.03, 0.01, 0.003, 0.001, 0.001, 0.001)
     least_columns: int = 6000
+    folds: int = 4
 
     def __post_init__(self) -> None:
         require(self.half_px >= 4, f"windows of ± {self.half_px} rows", "4 or more")
+        require(self.folds >= 2, f"{self.folds} folds", "2 or more")
         require(len(self.loading) >= 1, "no rounds", "at least one loading")
         require(0 < self.band_low < self.band_high <= 0.5, f"a band of {self.band_low} … {self.band_high}", "0 … 0.5")
 
@@ -71,8 +90,8 @@ class Learning:
         rules: Rules,
         spread: Spread,
         told: Callable[[], None] = lambda: None,
-    ) -> tuple[list[Stretch], tuple[Model, ...]]:
-        """Return the stretches with their paths improved, and a model for each round.
+    ) -> tuple[Lesson, ...]:
+        """Return what each round taught.
 
         Parameters
         ----------
@@ -90,16 +109,24 @@ class Learning:
         width = max(stretch.columns.shape[0] for stretch in stretches)
         length = fft.next_fast_len(width + self.largest_lag_px, real=True)
         whitener = self._whitener(stretches, layout, band, spread)
-        models: list[Model] = []
-        previous: Model | None = None
+        blank = Model(layout, whitener, self.half_px, band, length, ())
+        fold = np.arange(len(stretches)) % self.folds
+        lessons: list[Lesson] = []
         for loading in self.loading:
-            model = Model(layout, whitener, self.half_px, band, length, ())
-            model = self._learned(stretches, model, previous, loading, rules, spread)
-            stretches = list(spread(lambda s, m=model: s.moved(step(evidence(s, m, rules), cut, rules)), stretches))
-            models.append(model)
-            previous = model
+            lesson = self._lesson(
+                stretches, fold, blank, lessons[-1].whole if lessons else None, loading, rules, spread
+            )
+            stretches = list(
+                spread(
+                    lambda pair, of=lesson: pair[0].moved(
+                        step(evidence(pair[0], of.without[pair[1]], rules), cut, rules)
+                    ),
+                    zip(stretches, fold, strict=True),
+                )
+            )
+            lessons.append(lesson)
             told()
-        return stretches, tuple(models)
+        return tuple(lessons)
 
     def _whitener(self, stretches: list[Stretch], layout: StripeLayout, band: Band, spread: Spread) -> FloatArray:
         powers = [power for power in spread(lambda s: self._power(s, layout), stretches) if power is not None]
@@ -125,37 +152,64 @@ class Learning:
                     spectra.append(np.mean(np.abs(np.fft.rfft(level * taper, axis=1)) ** 2, axis=0))
         return np.median(spectra, axis=0) if spectra else None
 
-    def _learned(
+    def _lesson(
         self,
         stretches: list[Stretch],
-        model: Model,
+        fold: IntArray,
+        blank: Model,
         previous: Model | None,
         loading: float,
         rules: Rules,
         spread: Spread,
-    ) -> Model:
+    ) -> Lesson:
         """Learn one stripe after the other: their spectra first, then how their scores behave."""
-        statistics: list[StripeStatistics | None] = []
-        for number in range(model.layout.wall.size):
+        whole: list[StripeStatistics | None] = []
+        without: list[list[StripeStatistics | None]] = [[] for _ in range(self.folds)]
+        for number in range(blank.layout.wall.size):
             before = previous.stripes[number] if previous is not None else None
-            sums = [
-                s
-                for s in spread(lambda s, n=number, b=before: self._sums(s, model, n, b, rules), stretches)
-                if s is not None
-            ]
-            columns = int(sum(size for _, _, size in sums))
-            if columns < self.least_columns:
-                statistics.append(None)
-                continue
-            total = reduce(_added, (spectra for spectra, _, _ in sums))
-            power = np.sum([p for _, p, _ in sums], axis=0) / columns
-            c, dc = total.spectra(largest_lag_px=self.largest_lag_px, length=model.length)
-            bins = model.band.bins(model.length)
-            inverse = precision(c, band=bins, loading=loading)
-            told = information(inverse, dc, band=bins, length=model.length)
-            first = StripeStatistics(inverse, told, told, 0.0, power.astype(np.float32), columns)
-            statistics.append(self._tried(stretches, model, number, first, rules, spread))
-        return replace(model, stripes=tuple(statistics))
+            learned = self._stripe(stretches, fold, blank, number, before, loading, rules, spread)
+            whole.append(learned[-1])
+            for one, statistics in zip(without, learned, strict=False):
+                one.append(statistics)
+        return Lesson(
+            replace(blank, stripes=tuple(whole)), tuple(replace(blank, stripes=tuple(stripes)) for stripes in without)
+        )
+
+    def _stripe(
+        self,
+        stretches: list[Stretch],
+        fold: IntArray,
+        blank: Model,
+        number: int,
+        before: StripeStatistics | None,
+        loading: float,
+        rules: Rules,
+        spread: Spread,
+    ) -> list[StripeStatistics | None]:
+        """Return what is known of a stripe without each fold, and from all of them."""
+        sums = list(spread(lambda s: self._sums(s, blank, number, before, rules), stretches))
+        parts = [
+            [one for one, k in zip(sums, fold, strict=True) if one is not None and k != left]
+            for left in range(self.folds)
+        ]
+        parts.append([one for one in sums if one is not None])
+        if min(sum(size for _, _, size in part) for part in parts) < self.least_columns:
+            return [None] * len(parts)
+        first = [self._statistics(part, blank, loading) for part in parts]
+        mean, answer, power = self._tried(stretches, fold, blank, number, first, rules, spread)
+        return [replace(one, information=answer, mean_score=mean, score_power=power) for one in first]
+
+    def _statistics(
+        self, sums: list[tuple[CrossSpectra, FloatArray, float]], blank: Model, loading: float
+    ) -> StripeStatistics:
+        columns = sum(size for _, _, size in sums)
+        total = CrossSpectra(2 * self.half_px + 1, blank.length)
+        for one, _, _ in sums:
+            total.add(one)
+        c = total.spectra(largest_lag_px=self.largest_lag_px, length=blank.length)
+        inverse, noise = precision(c, band=blank.band.bins(blank.length), loading=loading)
+        row_power = np.sum([power for _, power, _ in sums], axis=0) / columns
+        return StripeStatistics(inverse, noise, 1.0, 1.0, 0.0, row_power.astype(np.float32), int(columns))
 
     def _sums(
         self, stretch: Stretch, model: Model, number: int, before: StripeStatistics | None, rules: Rules
@@ -163,8 +217,8 @@ class Learning:
         laid = self._laid(stretch, model, number, before, rules)
         if laid is None:
             return None
-        window, derivative, weight = laid
-        spectra = cross_spectra(window, derivative, weight, length=model.length)
+        window, _, weight = laid
+        spectra = cross_spectra(window, weight, length=model.length)
         return spectra, (window**2 * weight).sum(axis=1).astype(np.float64), float(weight.sum())
 
     def _laid(self, stretch: Stretch, model: Model, number: int, before: StripeStatistics | None, rules: Rules):
@@ -182,29 +236,48 @@ class Learning:
     def _tried(
         self,
         stretches: list[Stretch],
-        model: Model,
+        fold: IntArray,
+        blank: Model,
         number: int,
-        statistics: StripeStatistics,
+        learned: list[StripeStatistics],
         rules: Rules,
         spread: Spread,
-    ) -> StripeStatistics:
-        """Measure the mean and the power of the scores that a stripe gives."""
+    ) -> tuple[float, float, float]:
+        """Measure the mean of a stripe's scores, how they answer to a moved path, and their power."""
 
-        def tried(stretch: Stretch) -> tuple[FloatArray, FloatArray] | None:
-            laid = self._laid(stretch, model, number, statistics, rules)
+        def tried(pair: tuple[Stretch, int]) -> tuple[FloatArray, FloatArray, float] | None:
+            stretch, statistics = pair[0], learned[pair[1]]
+            laid = self._laid(stretch, blank, number, statistics, rules)
             if laid is None:
                 return None
             window, derivative, weight = laid
-            u = scores(window, derivative, weight, statistics.inverse, band=model.band, length=model.length)
-            return u, weight.astype(np.float64)
+            u = scores(window, derivative, weight, statistics, band=blank.band, length=blank.length)
+            answers = [
+                float(np.sum(weight * self._moved_score(stretch, blank, number, statistics, weight, side * MOVE_PX)))
+                for side in (-1, 1)
+            ]
+            return u, weight.astype(np.float64), (answers[0] - answers[1]) / (2 * MOVE_PX)
 
-        told = [one for one in spread(tried, stretches) if one is not None]
-        columns = sum(float(w.sum()) for _, w in told)
-        mean = sum(float(np.sum(u * w)) for u, w in told) / max(columns, 1.0)
-        powers = np.sum([quiet_power(u - mean, w) for u, w in told], axis=0)
-        return replace(statistics, mean_score=mean, score_power=float(powers[0] / max(powers[1], 1e-12)))
+        told = [one for one in spread(tried, zip(stretches, fold, strict=True)) if one is not None]
+        columns = max(sum(float(w.sum()) for _, w, _ in told), 1.0)
+        mean = sum(float(np.sum(u * w)) for u, w, _ in told) / columns
+        powers = np.sum([quiet_power(u - mean, w) for u, w, _ in told], axis=0)
+        answer = sum(answer for _, _, answer in told) / columns
+        return mean, max(answer, 1e-6), float(powers[0] / max(powers[1], 1e-12))
+
+    def _moved_score(
+        self,
+        stretch: Stretch,
+        model: Model,
+        number: int,
+        statistics: StripeStatistics,
+        weight: Float32Array,
+        move_px: float,
+    ) -> FloatArray:
+        row = model.layout.rows(stretch.displacement_px)[number] + move_px
+        window, derivative = windows(stretch, row, model.whitener, self.half_px)
+        return scores(window, derivative, weight, statistics, band=model.band, length=model.length)
 
 
-def _added(one: CrossSpectra, other: CrossSpectra) -> CrossSpectra:
-    one.add(other)
-    return one
+MOVE_PX = 0.1
+"""By which paths are moved to see how scores answer."""

@@ -3,9 +3,10 @@
 Whitened windows x that follow the right path are Gaussian with the cross-spectra C_f that the passage taught. If the path is
 moved by δ(s) across the rows, x changes by δ(s) x'(s), and the log-likelihood −½ Σ_f x_fᴴ C_f⁻¹ x_f by δ(s) times the score
 
-    u(s) = −x'(s) · (C⁻¹ x)(s) + constant,
+    u(s) = −x̂'(s) · y(s) + constant,     y = C⁻¹ x,     x̂ = x − N y,
 
-with C⁻¹ applied in the frequency domain: exact for every column, whatever the bandwidth of the sound. The expected change
+with C⁻¹ applied in the frequency domain: exact for every column, whatever the bandwidth of the sound. Only the texture x̂ moves
+with the groove, the camera's noise of the power N does not, so its share is taken out of the derivative. The expected change
 of the score with δ is Fisher's information I for one column. So u/I estimates what is missing from the path, with the error
 √J/I, where J is the real power of the score: equal to I if the texture is what the model says, measured because it is not.
 """
@@ -18,13 +19,17 @@ import numpy as np
 from scipy import fft, ndimage
 
 from gramoscope.conventions import BoolArray, FloatArray
-from gramoscope.pickup.texture.following import Float32Array
+from gramoscope.pickup.texture.following import REACH, Float32Array, across
 from gramoscope.pickup.texture.spectrum import Band
 
 TAPER_PX = 16
 """Half the width of the soft edge of a weight: so far around a damaged place nothing is read."""
-QUIET_BAND = (1 / 64, 1 / 24)
-"""Cycles a pixel, above any sound and below the correlation of the score with itself: its power there is that of its error."""
+TEMPER = 0.3
+LOUDNESS_PX = 3.0
+"""Standard deviation of the smoothing of the local loudness: the length of a few grains."""
+QUIET_BAND = (1 / 40, 1 / 18)
+"""Cycles a pixel: above any sound and what smoothed paths can follow, below the correlation of the score with itself. The
+power of the score there is that of its error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +40,10 @@ class StripeStatistics:
     ----------
     inverse : float32 array, shape (bin in the band, row, row)
         C_f⁻¹.
+    noise : float32 array, shape (bin in the band,)
+        N.
     information : float
-        I of one column, per row².
+        I of one column, per row²: how the mean score answers to a move of the path.
     score_power : float
         J of one column.
     mean_score : float
@@ -48,6 +55,7 @@ class StripeStatistics:
     """
 
     inverse: Float32Array
+    noise: Float32Array
     information: float
     score_power: float
     mean_score: float
@@ -64,12 +72,16 @@ def scores(
     window: Float32Array,
     derivative: Float32Array,
     weight: Float32Array,
-    inverse: Float32Array,
+    learned: StripeStatistics,
     *,
     band: Band,
     length: int,
 ) -> FloatArray:
-    """Return the score of each column, without its constant.
+    """Return the score of each column, without its constant, and tempered.
+
+    Real texture is not Gaussian: a cluster of bright grains is louder than the rest in everything it says, truth and error
+    alike. The score of each column is therefore divided by 0.3 + m, where m is the local value of xᵀC⁻¹x, 1 on average (the
+    weight of a t-distribution with few degrees of freedom). On skewed textures that is worth 5 dB.
 
     Parameters
     ----------
@@ -77,7 +89,7 @@ def scores(
         Whitened.
     weight : float32 array, shape (column,)
         0 … 1, soft.
-    inverse : float32 array, shape (bin in the band, row, row)
+    learned : StripeStatistics
     band : Band
     length : int
         Of the transform, at least the number of columns.
@@ -86,11 +98,18 @@ def scores(
     spectrum = fft.rfft(window * weight, length)
     inside = np.ascontiguousarray(spectrum[:, bins].T)
     both = np.stack([inside.real, inside.imag], axis=2)
-    explained = inverse @ both
+    explained = learned.inverse @ both
     full = np.zeros_like(spectrum)
     full[:, bins] = (explained[:, :, 0] + 1j * explained[:, :, 1]).T
     y = fft.irfft(full, length)[:, : window.shape[1]]
-    return np.asarray(-np.einsum("ij,ij->j", derivative, y), np.float64)
+    full[:, bins] *= learned.noise
+    still = np.pad(fft.irfft(full, length)[:, : window.shape[1]], ((REACH, REACH), (0, 0)))
+    moving = derivative - across(still)
+    # as many degrees of freedom a column as rows, in the share of the spectrum that is used
+    freedom = window.shape[0] * 2 * (bins.stop - bins.start) / length
+    loudness = ndimage.gaussian_filter1d(np.einsum("ij,ij->j", window, y), LOUDNESS_PX, mode="nearest") / freedom
+    tempered = np.einsum("ij,ij->j", moving, y) / (TEMPER + np.maximum(loudness, 0.0))
+    return np.asarray(-tempered, np.float64)
 
 
 def softened(valid: BoolArray) -> Float32Array:

@@ -106,7 +106,10 @@ class Rules:
     power_limits : (float, float)
         Columns with less or more texture than so many times the usual are damaged.
     smooth_px : float
-        Standard deviation of the smoothing of steps in the direction of the cut: passes sound, stops noise.
+        Least standard deviation of the smoothing of steps in the direction of the cut.
+    step_noise_px : float
+        Steps are smoothed more where their standard error would be larger than this, up to twice `smooth_px`: what
+        that takes from the treble the next rounds bring back.
     smooth_other_px : float
         The same for a direction that the cut does not use.
     largest_step_px : float
@@ -115,6 +118,7 @@ class Rules:
 
     power_limits: tuple[float, float] = (0.2, 4.0)
     smooth_px: float = 12.0
+    step_noise_px: float = 0.08
     smooth_other_px: float = 200.0
     largest_step_px: float = 1.0
 
@@ -150,7 +154,7 @@ def evidence(stretch: Stretch, model: Model, rules: Rules) -> Evidence:
         window, derivative = windows(stretch, row, model.whitener, model.half_px)
         clear &= believable(window, statistics.row_power, limits=rules.power_limits)
         weight = softened(clear)
-        u = scores(window, derivative, weight, statistics.inverse, band=model.band, length=model.length)
+        u = scores(window, derivative, weight, statistics, band=model.band, length=model.length)
         weight64 = weight.astype(np.float64)
         u = (u - statistics.mean_score) * statistics.trust
         score[wall] += weight64 * u
@@ -167,12 +171,11 @@ def step(found: Evidence, cut: Cut, rules: Rules) -> FloatArray:
     What both walls say together moves the groove in the direction of its cut, what they say against each other in the
     other one, slowly. Where one wall is silent it goes along with the other.
     """
+    smooth_px = _smoothing_px(found.information if cut == "stereo" else found.information.sum(axis=0), rules)
     if cut == "stereo":
-        return np.stack(
-            [_smoothed(found.score[w], found.information[w], rules.smooth_px, rules) for w in (INNER, OUTER)]
-        )
+        return np.stack([_smoothed(found.score[w], found.information[w], smooth_px, rules) for w in (INNER, OUTER)])
     sign = np.array([[1.0], [1.0]]) if cut == "lateral" else np.array([[-1.0], [1.0]])
-    common = _smoothed((sign * found.score).sum(axis=0), found.information.sum(axis=0), rules.smooth_px, rules)
+    common = _smoothed((sign * found.score).sum(axis=0), found.information.sum(axis=0), smooth_px, rules)
     inner, outer = found.information
     total = inner + outer
     both = np.divide(4 * inner * outer, total, out=np.zeros_like(total), where=total > 0)
@@ -201,6 +204,13 @@ def settled(displacement_px: FloatArray, support: FloatArray, cut: Cut, rules: R
     apart = apart / ndimage.gaussian_filter1d(both, rules.smooth_other_px, mode="nearest")
     middle = (weight * (signed + np.array([[1.0], [-1.0]]) * apart)).sum(axis=0) / weight.sum(axis=0)
     return np.asarray(sign * (middle + np.array([[-1.0], [1.0]]) * apart))
+
+
+def _smoothing_px(information: FloatArray, rules: Rules) -> float:
+    """Standard deviation of a Gaussian after which steps have the noise that the rules allow: 1/(2√π σ I) = noise²."""
+    usual = float(np.median(information[information > 0])) if (information > 0).any() else 0.0
+    wanted = 1 / (2 * np.sqrt(np.pi) * max(usual, 1e-9) * rules.step_noise_px**2)
+    return float(np.clip(wanted, rules.smooth_px, 2 * rules.smooth_px))
 
 
 def _smoothed(score: FloatArray, information: FloatArray, smooth_px: float, rules: Rules) -> FloatArray:

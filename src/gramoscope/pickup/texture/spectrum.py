@@ -18,7 +18,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy import fft, signal
 
 from gramoscope.conventions import FloatArray
@@ -96,17 +95,15 @@ class CrossSpectra:
     def __post_init__(self) -> None:
         bins = self.length // 2 + 1
         self.within: FloatArray = np.zeros((bins, self.rows, self.rows))
-        self.with_derivative: FloatArray = np.zeros((bins, self.rows, self.rows))
         self.weight: FloatArray = np.zeros(bins)
 
     def add(self, other: CrossSpectra) -> None:
         """Add the sums of other windows."""
         self.within += other.within
-        self.with_derivative += other.with_derivative
         self.weight += other.weight
 
-    def spectra(self, *, largest_lag_px: int, length: int) -> tuple[FloatArray, FloatArray]:
-        """Return C_f and dC_f.
+    def spectra(self, *, largest_lag_px: int, length: int) -> FloatArray:
+        """Return C_f.
 
         Parameters
         ----------
@@ -117,30 +114,24 @@ class CrossSpectra:
 
         Returns
         -------
-        c, dc : float64 arrays, shape (length // 2 + 1, row, row)
+        float64 array, shape (length // 2 + 1, row, row)
         """
-        lags = np.arange(largest_lag_px + 1)
-        u = lags / (largest_lag_px + 1)
+        u = np.arange(largest_lag_px + 1) / (largest_lag_px + 1)
         taper = np.where(u < 0.5, 1.0, 0.5 * (1 + np.cos(2 * np.pi * (u - 0.5))))
-        columns = fft.irfft(self.weight, self.length)[lags]
-        taper = taper / np.maximum(columns, 1.0)
-        moved = self.with_derivative + self.with_derivative.transpose(0, 2, 1)
-        return self._tapered(self.within, taper, length), self._tapered(moved, taper, length)
-
-    def _tapered(self, spectra: FloatArray, taper: FloatArray, length: int) -> FloatArray:
-        covariance = fft.irfft(spectra, self.length, axis=0)[: taper.size] * taper[:, None, None]
+        columns = np.maximum(fft.irfft(self.weight, self.length)[: u.size], 1.0)
+        covariance = fft.irfft(self.within, self.length, axis=0)[: u.size] * (taper / columns)[:, None, None]
         full = np.zeros((length, self.rows, self.rows))
-        full[: taper.size] = covariance
-        full[-taper.size + 1 :] = covariance[1:][::-1]
+        full[: u.size] = covariance
+        full[-u.size + 1 :] = covariance[1:][::-1]
         return np.asarray(fft.rfft(full, axis=0).real)
 
 
-def cross_spectra(window: Float32Array, derivative: Float32Array, weight: Float32Array, *, length: int) -> CrossSpectra:
+def cross_spectra(window: Float32Array, weight: Float32Array, *, length: int) -> CrossSpectra:
     """Return the cross-spectra of one window, zero where its columns have no weight.
 
     Parameters
     ----------
-    window, derivative : float32 arrays, shape (row, column)
+    window : float32 array, shape (row, column)
         Whitened.
     weight : float32 array, shape (column,)
         0 … 1, rising and falling softly.
@@ -148,22 +139,16 @@ def cross_spectra(window: Float32Array, derivative: Float32Array, weight: Float3
         Of the transforms.
     """
     x = np.ascontiguousarray(fft.rfft(window * weight, length).T)
-    d = np.ascontiguousarray(fft.rfft(derivative * weight, length).T)
     out = CrossSpectra(window.shape[0], length)
-    out.within += _real_products(x, x)
-    out.with_derivative += _real_products(d, x)
+    left = np.stack([x.real, x.imag], axis=2)
+    out.within += left @ left.transpose(0, 2, 1)
     out.weight += np.abs(fft.rfft(weight.astype(np.float64), length)) ** 2
     return out
 
 
-def _real_products(a: npt.NDArray[np.complex64], b: npt.NDArray[np.complex64]) -> Float32Array:
-    """Return Re(a bᴴ) of each bin, shape (bin, row, row)."""
-    left = np.stack([a.real, a.imag], axis=2)
-    right = np.stack([b.real, b.imag], axis=1)
-    return np.asarray(left @ right)
-
-
-def precision(c: FloatArray, *, band: slice, loading: float, smooth_bins: float = 16.0) -> Float32Array:
+def precision(
+    c: FloatArray, *, band: slice, loading: float, smooth_bins: float = 16.0
+) -> tuple[Float32Array, Float32Array]:
     """Return the inverse of C_f in a band, safe against what the sample could not tell.
 
     The least third of the eigenvalues of each C_f is noise; none is allowed below their mean (smoothed along f), and
@@ -190,11 +175,5 @@ def precision(c: FloatArray, *, band: slice, loading: float, smooth_bins: float 
     least = np.maximum(value[:, : rows // 3].mean(axis=1), 1e-12 * value[:, -1])
     floor = gaussian_filter1d(least, smooth_bins, mode="nearest")
     value = np.maximum(value, floor[:, None]) + loading * np.trace(c[band], axis1=1, axis2=2)[:, None] / rows
-    return np.asarray((vector / value[:, None, :]) @ vector.transpose(0, 2, 1), np.float32)
-
-
-def information(inverse: Float32Array, dc: FloatArray, *, band: slice, length: int) -> float:
-    """Return Fisher's information about a shift across the rows, for one column, per row²: Σ_f ½ tr(C⁻¹dC C⁻¹dC)."""
-    product = inverse.astype(np.float64) @ dc[band]
-    # bins of a real transform stand for two frequencies each
-    return float(np.einsum("fij,fji->", product, product) / length)
+    inverse = (vector / value[:, None, :]) @ vector.transpose(0, 2, 1)
+    return inverse.astype(np.float32), floor.astype(np.float32)
