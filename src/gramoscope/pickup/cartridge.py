@@ -16,7 +16,9 @@ Out = TypeVar("Out")
 class Spread(Protocol):
     """How work is spread over threads: like the built-in `map` with one iterable, answers in order."""
 
-    def __call__(self, work: Callable[[In], Out], tasks: Iterable[In]) -> Iterator[Out]: ...
+    def __call__(self, work: Callable[[In], Out], tasks: Iterable[In], /) -> Iterator[Out]:
+        """Return what the work makes of each task."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)

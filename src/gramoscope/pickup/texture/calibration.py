@@ -7,6 +7,7 @@ the stripes are. Their distances, with the known depth of either the walls' angl
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -42,12 +43,16 @@ def aligned_layout(
     sharp = list(spread(sharpness, pictures))
     layout = nominal
     for _ in range(ROUNDS):
-        found = list(spread(lambda one, at=layout: search.find(one, at, cut=cut), sharp))
+        found = list(spread(partial(_found, search, layout, cut), sharp))
         shift = _shifts(sharp, [path for path, _ in found], layout)
         layout = layout.at(layout.rest_row + shift)
         if np.abs(shift).max(initial=0.0) < 1.0:
             break
     return layout, found
+
+
+def _found(search: GrooveSearch, layout: StripeLayout, cut: Cut, sharp: FloatArray) -> tuple[FloatArray, FloatArray]:
+    return search.find(sharp, layout, cut=cut)
 
 
 def _shifts(sharp: list[FloatArray], paths: list[FloatArray], layout: StripeLayout) -> FloatArray:
@@ -65,7 +70,7 @@ def _shifts(sharp: list[FloatArray], paths: list[FloatArray], layout: StripeLayo
             profile[number] += ridge[cells[mine, None], at].sum(axis=0)
             seen[number] += np.count_nonzero(mine)
     shift = np.zeros(layout.wall.size)
-    for number in np.flatnonzero(seen > 100):
+    for number in np.flatnonzero(seen > 100).tolist():
         mean = profile[number] / seen[number]
         if mean.max() > 0.15:
             shift[number] = _peak(mean) - REACH_PX

@@ -116,17 +116,21 @@ class Learning:
             lesson = self._lesson(
                 stretches, fold, blank, lessons[-1].whole if lessons else None, loading, rules, spread
             )
-            stretches = list(
-                spread(
-                    lambda pair, of=lesson: pair[0].moved(
-                        step(evidence(pair[0], of.without[pair[1]], rules), cut, rules)
-                    ),
-                    zip(stretches, fold, strict=True),
-                )
-            )
+            stretches = self._moved(stretches, fold, lesson, cut, rules, spread)
             lessons.append(lesson)
             told()
         return tuple(lessons)
+
+    def _moved(
+        self, stretches: list[Stretch], fold: IntArray, lesson: Lesson, cut: Cut, rules: Rules, spread: Spread
+    ) -> list[Stretch]:
+        """Improve every path by what the other folds taught."""
+
+        def moved(pair: tuple[Stretch, int]) -> Stretch:
+            stretch, left = pair
+            return stretch.moved(step(evidence(stretch, lesson.without[left], rules), cut, rules))
+
+        return list(spread(moved, zip(stretches, fold, strict=True)))
 
     def _whitener(self, stretches: list[Stretch], layout: StripeLayout, band: Band, spread: Spread) -> FloatArray:
         powers = [power for power in spread(lambda s: self._power(s, layout), stretches) if power is not None]
@@ -221,7 +225,10 @@ class Learning:
         spectra = cross_spectra(window, weight, length=model.length)
         return spectra, (window**2 * weight).sum(axis=1).astype(np.float64), float(weight.sum())
 
-    def _laid(self, stretch: Stretch, model: Model, number: int, before: StripeStatistics | None, rules: Rules):
+    def _laid(
+        self, stretch: Stretch, model: Model, number: int, before: StripeStatistics | None, rules: Rules
+    ) -> tuple[Float32Array, Float32Array, Float32Array] | None:
+        """Return window, derivative and weight of a stripe; None where too little of it can be seen."""
         row = model.layout.rows(stretch.displacement_px)[number]
         seen = model.layout.visible(model.layout.rows(stretch.displacement_px), half_px=self.half_px)[number]
         clear = clear_columns(stretch, row, seen, self.half_px)

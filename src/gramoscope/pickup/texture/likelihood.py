@@ -103,8 +103,8 @@ def scores(
     full[:, bins] = (explained[:, :, 0] + 1j * explained[:, :, 1]).T
     y = fft.irfft(full, length)[:, : window.shape[1]]
     full[:, bins] *= learned.noise
-    still = np.pad(fft.irfft(full, length)[:, : window.shape[1]], ((REACH, REACH), (0, 0)))
-    moving = derivative - across(still)
+    still = np.pad(fft.irfft(full, length)[:, : window.shape[1]], ((REACH, REACH), (0, 0))).astype(np.float32)
+    moving = np.subtract(derivative, across(still))
     # as many degrees of freedom a column as rows, in the share of the spectrum that is used
     freedom = window.shape[0] * 2 * (bins.stop - bins.start) / length
     loudness = ndimage.gaussian_filter1d(np.einsum("ij,ij->j", window, y), LOUDNESS_PX, mode="nearest") / freedom

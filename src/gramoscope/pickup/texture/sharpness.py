@@ -1,8 +1,8 @@
 """Where a picture is sharp: the energy of its texture, in cells of a few columns by one row.
 
 Texture in focus has strong differences from column to column, blurred texture has weak ones, and shading has none. What
-every cell has anyway (camera noise) is measured in the quietest rows, and the root of the energy above it is what the search for
-the groove adds up: a stripe is a ridge in it, three rows or so wide on either side. A scratch or a speck is brighter than
+every cell has anyway (camera noise) is measured in the quietest rows, and the root of the energy above it is what the search
+for the groove adds up: a stripe is a ridge in it, three rows or so wide on either side. A scratch or a speck is brighter than
 any stripe, so the root is cut off.
 """
 
