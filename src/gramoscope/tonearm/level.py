@@ -24,8 +24,20 @@ LEAST_SAMPLES = 20
 """A stretch with fewer tells nothing."""
 NORMAL = 1.4826
 """Standard deviation of normal numbers whose absolute values have the median one."""
+BOTH_WALLS = 0.1
+"""A stretch that shows both walls over less than this share is read by its best wall alone."""
+MEDIAN_VARIANCE = 0.21
+"""Variance of the median of seven normal numbers, for each unit of theirs."""
 NEIGHBOURS = 2
 """So many stretches on each side take part in a level."""
+
+
+@dataclass(frozen=True, eq=False)
+class Walls:
+    """Place and variance of both walls, shape (2, sample), NaN where unknown."""
+
+    place_m: FloatArray
+    variance: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +46,6 @@ class OneDirection:
 
     place_m: FloatArray
     variance: FloatArray
-    step_m: float
 
     @property
     def known(self) -> int:
@@ -42,44 +53,54 @@ class OneDirection:
         return int(np.count_nonzero(np.isfinite(self.place_m)))
 
 
-def one_direction(stretch: Stretch, direction: Direction, gains: FloatArray) -> OneDirection:
+def trusted(stretch: Stretch) -> Walls:
+    """Return the samples of a stretch that are not suspect."""
+    return Walls(np.where(stretch.suspect, np.nan, stretch.place_m), stretch.variance)
+
+
+def calmed(stretch: Stretch) -> Walls:
+    """Return the running medians of a stretch, which outliers hardly move."""
+    return Walls(stretch.middle_m, MEDIAN_VARIANCE * stretch.variance)
+
+
+def one_direction(walls: Walls, direction: Direction, gains: FloatArray, *, listening: bool) -> OneDirection:
     """Return what both walls together say of one direction.
 
     Parameters
     ----------
-    stretch : Stretch
+    walls : Walls
     direction : {"lateral", "vertical"}
     gains : float64 array, shape (2,)
-        How far the inner and the outer wall move outwards, in the picture, when the groove rises by one.
+        How far the inner and the outer wall move towards +l when the groove rises by one.
+    listening : bool
+        If hardly ever both walls were seen, the one that was seen better is taken as if the groove moved in this
+        direction only.
 
     Returns
     -------
     OneDirection
         Free of the other direction; NaN where not both walls were seen.
     """
-    inner, outer = stretch.place_m
+    seen = np.isfinite(walls.place_m)
+    if listening and np.count_nonzero(seen.all(axis=0)) < BOTH_WALLS * seen.shape[1]:
+        best = int(np.argmax(seen.sum(axis=1)))
+        gain = 1.0 if direction == "lateral" else gains[best]
+        return OneDirection(walls.place_m[best] / gain, walls.variance[best] / gain**2)
     weight = np.array([gains[OUTER], -gains[INNER]] if direction == "lateral" else [-1.0, 1.0])
     weight = weight / (gains[OUTER] - gains[INNER])
-    return OneDirection(weight[INNER] * inner + weight[OUTER] * outer, weight**2 @ stretch.variance, stretch.step_m)
+    return OneDirection(weight @ walls.place_m, weight**2 @ walls.variance)
 
 
-def one_wall(stretch: Stretch, direction: Direction, gains: FloatArray) -> OneDirection:
-    """Return what the wall that was seen best says of one direction, if the groove does not move in the other."""
-    best = int(np.argmax(np.isfinite(stretch.place_m).sum(axis=1)))
-    gain = 1.0 if direction == "lateral" else gains[best]
-    return OneDirection(stretch.place_m[best] / gain, stretch.variance[best] / gain**2, stretch.step_m)
-
-
-def bend_power(one: OneDirection) -> float:
+def bend_power(one: OneDirection, step_m: float) -> float:
     """Return the variance of the bends of one stretch; below zero by chance when silent, NaN when hardly seen."""
-    lag = max(int(np.rint(BEND_M / one.step_m)), 1)
+    lag = max(int(np.rint(BEND_M / step_m)), 1)
     place, variance = one.place_m, one.variance
     bends = place[2 * lag :] - 2 * place[lag:-lag] + place[: -2 * lag]
     seen = np.isfinite(bends)
     if np.count_nonzero(seen) < LEAST_SAMPLES:
         return float("nan")
     noise = np.median((variance[2 * lag :] + 4 * variance[lag:-lag] + variance[: -2 * lag])[seen])
-    return float(((NORMAL * np.median(np.abs(bends[seen]))) ** 2 - noise) / (lag * one.step_m) ** 2)
+    return float(((NORMAL * np.median(np.abs(bends[seen]))) ** 2 - noise) / (lag * step_m) ** 2)
 
 
 def levels(powers: Iterable[FloatArray]) -> Iterator[FloatArray]:

@@ -5,50 +5,31 @@ the vertical one h. With its wall at the angle φ, a sample of the inner wall re
 a + h cot φ, each up to a constant of its own, which a and h take up where they start. So two walls give both directions; one
 alone carries on with the other direction held by its prior; where both are missing the groove drifts on as the prior lets
 it, with an error that says so. Each sample goes to its nearest bin, over the fraction of a step between them by Taylor's
-series.
-
-*Outliers.* A first pass rejects what is further than the gate from its prediction; while it rejects, its error grows as fast
-as grooves move, so it cannot lose the groove for good. Smoothed backwards, that tells of each sample how far it lies from
-what all others say, and by this it is accepted or rejected once more, for the second pass that counts. So what was rejected
-because the prediction was bad comes back.
-
-*The prior* follows the loudness stretch by stretch (`tonearm.level`); its spectrum is learned anew from every `learn_groups`
-groups (`tonearm.learn_groove`): records begin in silence and get loud.
+series. Outliers get no weight (`tonearm.groove_model`). The prior follows the loudness stretch by stretch (`tonearm.level`),
+and its spectrum is learned anew from every so many groups (`tonearm.teacher`): records begin in silence and get loud.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
-from itertools import chain, islice, tee
-from typing import get_args
+from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
-from gramoscope.conventions import BoolArray, FloatArray, IntArray
-from gramoscope.disc.formats import Direction
+from gramoscope.conventions import FloatArray
 from gramoscope.errors import require
 from gramoscope.quality import FlagArray
 from gramoscope.signal_path import GrooveMotion, WallTrace
 from gramoscope.tonearm.course import Course
 from gramoscope.tonearm.grid_flags import OUTLIER, grid_flags
-from gramoscope.tonearm.groove_prior import SLOPE, STATES, GroovePrior, start, taylor
-from gramoscope.tonearm.learn_groove import PriorLimits, learn, lesson
-from gramoscope.tonearm.level import OneDirection, bend_power, levels, one_direction, one_wall
-from gramoscope.tonearm.linear_gaussian import Moves, Readings, Smoothed, backward, forward
+from gramoscope.tonearm.groove_model import GrooveModel, PassState, beginning, moves, robustly, which
+from gramoscope.tonearm.place_samples import PlaceSamples, joined, samples_of
 from gramoscope.tonearm.stretches import Stretch, counted_from_the_start, handed_over, stretch_of
+from gramoscope.tonearm.teacher import DIRECTIONS, Teacher, Teaching
 
-DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
-ANYWHERE_M = 1e-3
-"""How little is known of where a passage begins."""
-FIRST_TEACHERS, TEACHERS = 24, 8
-"""So many stretches of those that a prior is learned from are looked at, the first time and later."""
-BOTH_WALLS = 0.1
-"""A stretch that shows both walls over less than this share teaches by its best wall alone."""
 UNOBSERVABLE = 0.95
 """With this share of the prior's sigma left, nothing is known of a direction."""
-LEAST_SHARE = 1e-3
-"""Samples that keep less of their information are left out."""
 
 
 @dataclass(frozen=True)
@@ -111,75 +92,20 @@ class PlaceSmoother:
         first = next(stream, None)
         if first is None:
             return
-        follower = _PlaceFollower(self, course, first.arc_step_m)
-        stretches = counted_from_the_start(stretch_of(trace) for trace in chain([first], stream))
-        yield from follower.blocks(follower.taught(handed_over(stretches)))
+        stretches = handed_over(counted_from_the_start(stretch_of(trace) for trace in chain([first], stream)))
+        teacher = Teacher(course, first.arc_step_m, self.teaching, self.gate)
+        yield from _PlaceFollower(self, course, first.arc_step_m).blocks(teacher.taught(stretches))
 
-
-@dataclass(frozen=True, eq=False)
-class _Samples:
-    """Samples of either wall that were heard and not yet answered, one after the other."""
-
-    arc_m: FloatArray
-    wall: IntArray
-    place_m: FloatArray
-    variance: FloatArray
-    gate_variance: FloatArray
-    flags: FlagArray
-
-    @staticmethod
-    def of(stretch: Stretch) -> _Samples:
-        keep = np.maximum(stretch.share, LEAST_SHARE)
-        seen = np.where(stretch.share > LEAST_SHARE, stretch.place_m, np.nan)
-        return _Samples(
-            np.broadcast_to(stretch.arc_m, seen.shape).ravel(order="F"),
-            np.tile(np.arange(2), stretch.arc_m.size),
-            seen.ravel(order="F"),
-            (stretch.variance * stretch.correlation_samples / keep).ravel(order="F"),
-            stretch.variance.ravel(order="F"),
-            stretch.flags.ravel(order="F"),
+    @property
+    def teaching(self) -> Teaching:
+        """What of these settings the prior is learned by."""
+        return Teaching(
+            groups=self.learn_groups,
+            corner_limits_hz=self.corner_limits_hz,
+            cutoff_limits_hz=self.cutoff_limits_hz,
+            floor_m_s=self.floor_m_s,
+            other_floor_m_s=self.other_floor_m_s,
         )
-
-    @staticmethod
-    def joined(pieces: list[_Samples]) -> _Samples:
-        return _Samples(
-            np.concatenate([piece.arc_m for piece in pieces]),
-            np.concatenate([piece.wall for piece in pieces]),
-            np.concatenate([piece.place_m for piece in pieces]),
-            np.concatenate([piece.variance for piece in pieces]),
-            np.concatenate([piece.gate_variance for piece in pieces]),
-            np.concatenate([piece.flags for piece in pieces]),
-        )
-
-    def part(self, keep: BoolArray | IntArray) -> _Samples:
-        return _Samples(
-            self.arc_m[keep],
-            self.wall[keep],
-            self.place_m[keep],
-            self.variance[keep],
-            self.gate_variance[keep],
-            self.flags[keep],
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class _Model:
-    """What is believed of both directions from a bin on."""
-
-    from_bin: int
-    priors: tuple[GroovePrior, ...]
-    sigma: FloatArray
-    a: FloatArray
-    q: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class _State:
-    """Where both passes go on: mean and covariance at a bin, before its samples."""
-
-    bin: int
-    mean: tuple[FloatArray, FloatArray]
-    covariance: tuple[FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -190,150 +116,66 @@ class _PlaceFollower:
     course: Course
     step_m: float
 
-    @property
-    def gains(self) -> FloatArray:
-        """How far each wall moves outwards in the picture when the groove rises by one."""
-        return np.array([-1.0, 1.0]) / np.tan(self.course.wall_angles_rad)
-
-    def taught(self, stretches: Iterator[Stretch]) -> Iterator[tuple[Stretch, _Model]]:
-        """Return each stretch with what is believed of it."""
-        one, other = tee(stretches)
-        levelled = zip(one, levels(self._powers(stretch) for stretch in other), strict=True)
-        before: tuple[GroovePrior | None, ...] = (None, None)
-        while batch := [
-            (stretch, np.maximum(level, self._floor(stretch)))
-            for stretch, level in islice(levelled, self.smoother.learn_groups)
-        ]:
-            before = priors = tuple(self._learn(batch, i, prior) for i, prior in enumerate(before))
-            steps = [prior.steps(self.step_m) for prior in priors]
-            a, q = np.stack([a for a, _ in steps]), np.stack([q for _, q in steps])
-            unit = np.array([prior.sigma(1.0, self.step_m) for prior in priors])
-            for stretch, level in batch:
-                q_here = (unit * level)[:, None, None] ** 2 * q
-                yield stretch, _Model(self._bin(float(stretch.arc_m[0])), priors, unit * level, a, q_here)
-
-    def _floor(self, stretch: Stretch) -> FloatArray:
-        floors = [
-            self.smoother.floor_m_s if direction == self.course.direction else self.smoother.other_floor_m_s
-            for direction in DIRECTIONS
-        ]
-        return np.array(floors) / self.course.rotation.speed_at_m_s(stretch.arc_m[0])
-
-    def _powers(self, stretch: Stretch) -> FloatArray:
-        return np.array([bend_power(self._seen(stretch, direction)) for direction in DIRECTIONS])
-
-    def _seen(self, stretch: Stretch, direction: Direction) -> OneDirection:
-        seen = one_direction(stretch, direction, self.gains)
-        if direction == self.course.direction and seen.known < BOTH_WALLS * stretch.arc_m.size:
-            return one_wall(stretch, direction, self.gains)
-        return seen
-
-    def _learn(
-        self, batch: list[tuple[Stretch, FloatArray]], direction: int, before: GroovePrior | None
-    ) -> GroovePrior:
-        count = min(FIRST_TEACHERS if before is None else TEACHERS, len(batch))
-        teachers = [batch[i] for i in np.linspace(0, len(batch) - 1, count).round().astype(int)]
-        name = DIRECTIONS[direction]
-        lessons = [lesson(self._seen(stretch, name), float(level[direction])) for stretch, level in teachers]
-        limits = self._limits(float(batch[0][0].arc_m[0]))
-        return learn([one for one in lessons if one is not None], self.step_m, limits, before=before)
-
-    def _limits(self, arc_m: float) -> PriorLimits:
-        per_hz = 2 * np.pi / float(self.course.rotation.speed_at_m_s(arc_m))
-        (low, high), (lowest, highest) = self.smoother.corner_limits_hz, self.smoother.cutoff_limits_hz
-        return PriorLimits((per_hz * low, per_hz * high), (per_hz * lowest, per_hz * highest))
-
-    def _bin(self, arc_m: float) -> int:
-        return int(np.rint(arc_m / self.step_m))
-
-    def blocks(self, stretches: Iterator[tuple[Stretch, _Model]]) -> Iterator[GrooveMotion]:
+    def blocks(self, stretches: Iterator[tuple[Stretch, GrooveModel]]) -> Iterator[GrooveMotion]:
         """Answer bin after bin, some way behind the newest stretch."""
-        pieces, models, done, last, state = list[_Samples](), list[_Model](), 0, 0, None
+        pieces, models, done, last = list[PlaceSamples](), list[GrooveModel](), 0, 0
+        state: PassState | None = None
         current = next(stretches, None)
         while current is not None:
             taken = 0
             while current is not None and taken < self.smoother.block_groups:
-                stretch, model = current
-                last = max(last, self._bin(stretch.arc_m[-1]))
-                pieces.append(_Samples.of(stretch))
-                models = models if models and models[-1] is model else [*models, model]
+                pieces.append(samples_of(current[0], self.step_m))
+                models.append(current[1])
+                last = max(last, int(pieces[-1].bin[-1]))
                 current, taken = next(stretches, None), taken + 1
-            samples = _Samples.joined(pieces)
-            if state is None:
-                state = self._start(models[0], min(0, self._bin(float(samples.arc_m[0]))))
+            state = state or beginning(models[0], min(0, int(pieces[0].bin[0])))
             if current is None:
-                heard = max(last, int(np.floor(self.course.passage_length_m / self.step_m)))
-                stop = heard + 1
+                end = stop = max(last, int(np.floor(self.course.passage_length_m / self.step_m))) + 1
             else:
-                heard = self._bin(current[0].arc_m[0]) - 1
-                stop = heard + 1 - self._lookahead(models)
+                end = current[1].from_bin
+                stop = end - self._lookahead(models)
             if stop > done:
-                motion, state, samples = self._answer(samples, models, state, (done, stop, heard + 1))
-                pieces = [samples]
+                motion, state, samples = self._answer(joined(pieces), models, state, (done, stop, end))
                 yield motion
-                models = [m for m, after in zip(models, [*models[1:], None], strict=True) if not _over(after, stop)]
-                done = stop
+                pieces, done = [samples], stop
+                models = models[int(which(models, np.array([stop]))[0]) :]
 
-    def _lookahead(self, models: list[_Model]) -> int:
-        slowest = min(prior.corner_per_m for model in models for prior in model.priors)
+    def _lookahead(self, models: list[GrooveModel]) -> int:
+        slowest = min(model.slowest_per_m for model in models)
         return int(np.ceil(self.smoother.lookahead / slowest / self.step_m))
 
-    def _start(self, model: _Model, first: int) -> _State:
-        covariance = np.zeros((2 * STATES, 2 * STATES))
-        for i, prior in enumerate(model.priors):
-            part = slice(i * STATES, (i + 1) * STATES)
-            resting = prior.at_rest(self.step_m)
-            covariance[part, part] = start(resting, float(model.sigma[i]), place_sigma_m=ANYWHERE_M)
-        mean = np.zeros(2 * STATES)
-        return _State(first, (mean, mean), (covariance, covariance))
-
     def _answer(
-        self, samples: _Samples, models: list[_Model], state: _State, bins: tuple[int, int, int]
-    ) -> tuple[GrooveMotion, _State, _Samples]:
+        self, samples: PlaceSamples, models: list[GrooveModel], state: PassState, bins: tuple[int, int, int]
+    ) -> tuple[GrooveMotion, PassState, PlaceSamples]:
         """Answer bins[0] … bins[1] − 1 by all samples before bins[2]; return what is needed to go on."""
-        start, stop, end = bins
-        place = np.rint(samples.arc_m / self.step_m).astype(np.int64)
-        fresh = np.flatnonzero(np.isfinite(samples.place_m) & (place >= state.bin) & (place < end))
-        fresh = fresh[np.argsort(place[fresh], kind="stable")]
-        readings = self._readings(samples.part(fresh), place[fresh], state.bin)
-        moves = _moves(models, np.arange(state.bin, end))
-        smoothed, state, rejected = self._two_passes(moves, readings, state, stop)
-        outlier = np.zeros(place.size, np.bool_)
-        outlier[fresh] = rejected
-        flags = np.where(outlier, samples.flags | OUTLIER, samples.flags).astype(np.uint16)
-        grid = np.arange(start, stop, dtype=np.float64) * self.step_m
-        answered = slice(smoothed.mean.shape[0] - (end - start), smoothed.mean.shape[0] - (end - stop))
-        motion = self._motion(
-            grid,
-            smoothed.mean[answered] / self.step_m,
-            smoothed.sigma[answered] / self.step_m,
-            grid_flags(grid, samples.arc_m, flags, reach_m=self.step_m),
-            _prior_sigma(models, np.arange(start, stop)),
+        first, stop, end = bins
+        measured = samples.measured(state.bin, end)
+        fresh = samples.part(measured)
+        followed = robustly(
+            moves(models, np.arange(state.bin, end)),
+            fresh.readings(first_bin=state.bin, step_m=self.step_m, gains=self.course.gains),
+            ~fresh.suspect,
+            state,
+            gate=self.smoother.gate,
         )
-        settled = replace(samples, flags=np.where(place < stop, flags, samples.flags).astype(np.uint16))
-        return motion, state, settled.part(place >= stop - 2)
-
-    def _readings(self, samples: _Samples, place: IntArray, first: int) -> Readings:
-        row = taylor(samples.arc_m / self.step_m - place)
-        vertical = row * self.gains[samples.wall][:, None]
-        h = np.concatenate([row, vertical], axis=1)
-        return Readings(place - first, h, samples.place_m, samples.variance, samples.gate_variance)
-
-    def _two_passes(
-        self, moves: Moves, readings: Readings, state: _State, stop: int
-    ) -> tuple[Smoothed, _State, BoolArray]:
-        gate, wanted = self.smoother.gate, np.array([SLOPE, STATES + SLOPE])
-        first = forward(moves, readings, mean=state.mean[0], covariance=state.covariance[0], gate=gate)
-        accepted = backward(moves, readings, first, wanted=wanted[:0]).distance <= gate
-        second = forward(moves, readings, mean=state.mean[1], covariance=state.covariance[1], allowed=accepted)
-        smoothed = backward(moves, readings, second, wanted=wanted)
-        at = min(stop - state.bin, moves.model.size - 1)
-        after = _State(state.bin + at, (first.mean[at], second.mean[at]), (first.covariance[at], second.covariance[at]))
-        return smoothed, after, ~accepted
+        flags = samples.flags.copy()
+        flags[measured[~followed.accepted]] |= OUTLIER
+        answered = slice(first - state.bin, stop - state.bin)
+        motion = self._motion(
+            np.arange(first, stop, dtype=np.float64) * self.step_m,
+            followed.smoothed.mean[answered] / self.step_m,
+            followed.smoothed.sigma[answered] / self.step_m,
+            np.stack([model.sigma for model in models])[which(models, np.arange(first, stop))],
+            samples.flagged(flags),
+        )
+        # outliers stay outliers when the next block looks at them again
+        settled = samples.flagged(np.where(samples.bin < stop, flags, samples.flags)).part(samples.bin >= stop - 2)
+        return motion, followed.state(state.bin, min(stop, end - 1)), settled
 
     def _motion(
-        self, grid: FloatArray, slope: FloatArray, sigma: FloatArray, flags: FlagArray, prior_sigma: FloatArray
+        self, grid: FloatArray, slope: FloatArray, sigma: FloatArray, prior_sigma: FloatArray, samples: PlaceSamples
     ) -> GrooveMotion:
+        flags: FlagArray = grid_flags(grid, samples.arc_m, samples.flags, reach_m=self.step_m)
         speed = self.course.rotation.speed_at_m_s(grid)[:, None]
         unknown = sigma > UNOBSERVABLE * prior_sigma
         unknown[:, DIRECTIONS.index(self.course.direction)] = False
@@ -341,21 +183,3 @@ class _PlaceFollower:
         return GrooveMotion(
             float(grid[0]), self.step_m, velocity[:, 0], error[:, 0], velocity[:, 1], error[:, 1], flags
         )
-
-
-def _over(after: _Model | None, stop: int) -> bool:
-    """Whether a model that this one follows is needed no more."""
-    return after is not None and after.from_bin <= stop
-
-
-def _which(models: list[_Model], bins: IntArray) -> IntArray:
-    starts = [model.from_bin for model in models]
-    return np.maximum(np.searchsorted(starts, bins, side="right") - 1, 0)
-
-
-def _moves(models: list[_Model], bins: IntArray) -> Moves:
-    return Moves(np.stack([m.a for m in models]), np.stack([m.q for m in models]), _which(models, bins))
-
-
-def _prior_sigma(models: list[_Model], bins: IntArray) -> FloatArray:
-    return np.stack([model.sigma for model in models])[_which(models, bins)]

@@ -1,0 +1,172 @@
+"""The state of the groove in both directions, how it moves along the grid, and a smoother that outliers cannot fool.
+
+A first pass leaves out what disagrees with its nearest neighbours, and rejects what is further than the gate from its
+prediction; while it rejects, its error grows as fast as grooves move, so it cannot lose the groove for good. Smoothed
+backwards, that tells of each reading how far it lies from what all others say, and by this it is accepted or rejected once
+more, for a second pass, and so on until nothing changes. So what was rejected because the prediction was bad comes back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gramoscope.conventions import BoolArray, FloatArray, IntArray
+from gramoscope.tonearm.groove_prior import SLOPE, STATES, GroovePrior, start
+from gramoscope.tonearm.linear_gaussian import Filtered, Moves, Readings, Smoothed, backward, forward
+
+ANYWHERE_M = 1e-3
+"""How little is known of where a passage begins, once its first sample is taken off."""
+ROUNDS = 4
+"""At most so often is looked again which readings are outliers."""
+SLOPES = np.array([SLOPE, STATES + SLOPE])
+"""Where the lateral and the vertical slope (times the step) stand in the state."""
+
+
+@dataclass(frozen=True, eq=False)
+class GrooveModel:
+    """What is believed of both directions, lateral first, from a bin on.
+
+    Attributes
+    ----------
+    from_bin : int
+    slowest_per_m : float
+        The least λ: what forgets most slowly.
+    sigma : float64 array, shape (2,)
+        Of the slopes.
+    a, q : float64 arrays, shape (2, 6, 6)
+        One step of the grid.
+    covariance : float64 array, shape (12, 12)
+        Of the state before anything was seen.
+    """
+
+    from_bin: int
+    slowest_per_m: float
+    sigma: FloatArray
+    a: FloatArray
+    q: FloatArray
+    covariance: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Beliefs:
+    """The priors of both directions, made ready for a grid; see `beliefs`.
+
+    Attributes
+    ----------
+    priors : (GroovePrior, GroovePrior)
+        Lateral and vertical.
+    a, q : float64 arrays, shape (2, 6, 6)
+        For σ = 1.
+    at_rest : float64 array, shape (2, 5, 5)
+        The same.
+    sigma_of_level : float64 array, shape (2,)
+    """
+
+    priors: tuple[GroovePrior, GroovePrior]
+    a: FloatArray
+    q: FloatArray
+    at_rest: FloatArray
+    sigma_of_level: FloatArray
+
+    def model(self, from_bin: int, level: FloatArray) -> GrooveModel:
+        """Return what is believed at a level, shape (2,), from a bin on."""
+        sigma = self.sigma_of_level * level
+        covariance = np.zeros((2 * STATES, 2 * STATES))
+        for i in range(2):
+            part = slice(i * STATES, (i + 1) * STATES)
+            covariance[part, part] = start(self.at_rest[i], sigma[i], place_sigma_m=ANYWHERE_M)
+        slowest = min(prior.corner_per_m for prior in self.priors)
+        return GrooveModel(from_bin, slowest, sigma, self.a, sigma[:, None, None] ** 2 * self.q, covariance)
+
+
+def beliefs(priors: tuple[GroovePrior, GroovePrior], step_m: float) -> Beliefs:
+    """Return priors made ready for a grid."""
+    steps = [prior.steps(step_m) for prior in priors]
+    return Beliefs(
+        priors,
+        np.stack([a for a, _ in steps]),
+        np.stack([q for _, q in steps]),
+        np.stack([prior.at_rest(step_m) for prior in priors]),
+        np.array([prior.sigma(1.0, step_m) for prior in priors]),
+    )
+
+
+def which(models: Sequence[GrooveModel], bins: IntArray) -> IntArray:
+    """Return the number of the model that holds at each bin; before the first one begins it holds too."""
+    starts = [model.from_bin for model in models]
+    return np.maximum(np.searchsorted(starts, bins, side="right") - 1, 0)
+
+
+def moves(models: Sequence[GrooveModel], bins: IntArray) -> Moves:
+    """Return how the state moves from each bin to the next."""
+    return Moves(np.stack([m.a for m in models]), np.stack([m.q for m in models]), which(models, bins))
+
+
+@dataclass(frozen=True, eq=False)
+class PassState:
+    """Where the first and the last pass go on: mean and covariance at a bin, before its readings."""
+
+    bin: int
+    means: tuple[FloatArray, FloatArray]
+    covariances: tuple[FloatArray, FloatArray]
+
+
+def beginning(model: GrooveModel, first_bin: int) -> PassState:
+    """Return the state before anything was seen."""
+    mean = np.zeros(2 * STATES)
+    return PassState(first_bin, (mean, mean), (model.covariance, model.covariance))
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """Result of `robustly`.
+
+    Attributes
+    ----------
+    smoothed : Smoothed
+        Slopes of both directions, times the step.
+    accepted : bool array, shape (reading,)
+    passes : (Filtered, Filtered)
+        The first and the last.
+    """
+
+    smoothed: Smoothed
+    accepted: BoolArray
+    passes: tuple[Filtered, Filtered]
+
+    def state(self, first_bin: int, bin_: int) -> PassState:
+        """Return where to go on at a bin; `first_bin` is where the passes began."""
+        one, two = self.passes
+        at = bin_ - first_bin
+        return PassState(bin_, (one.mean[at], two.mean[at]), (one.covariance[at], two.covariance[at]))
+
+
+def robustly(steps: Moves, readings: Readings, trusted: BoolArray, begin: PassState, *, gate: float) -> Followed:
+    """Smooth the groove by readings some of which are wild.
+
+    Parameters
+    ----------
+    steps : Moves
+    readings : Readings
+    trusted : bool array, shape (reading,)
+        What the first pass may use.
+    begin : PassState
+    gate : float
+        Standard deviations.
+
+    Returns
+    -------
+    Followed
+    """
+    first = forward(steps, readings, mean=begin.means[0], covariance=begin.covariances[0], gate=gate, allowed=trusted)
+    accepted = backward(steps, readings, first, wanted=SLOPES[:0]).distance <= gate
+    for _ in range(ROUNDS):
+        last = forward(steps, readings, mean=begin.means[1], covariance=begin.covariances[1], allowed=accepted)
+        smoothed = backward(steps, readings, last, wanted=SLOPES)
+        used, accepted = accepted, smoothed.distance <= gate
+        if np.array_equal(used, accepted):
+            break
+    return Followed(smoothed, used, (first, last))
