@@ -17,9 +17,10 @@ from gramoscope.apparatus.bench import Sequence
 from gramoscope.apparatus.capture import Capture, open_capture
 from gramoscope.apparatus.capture_writer import CaptureWriter
 from gramoscope.conventions import BoolArray, FloatArray
+from gramoscope.pickup.cartridge import Pickup
 from gramoscope.player import play as play_module
 from gramoscope.player.monitor import Monitor
-from gramoscope.player.recipe import Recipe, load_recipe
+from gramoscope.player.recipe import load_recipe
 from gramoscope.signal_path import ImageArray
 from gramoscope.simulation.passage import Passage
 from gramoscope.simulation.render import cut_passage, render_group
@@ -79,9 +80,9 @@ def play_capture(capture: Path, out: Path, *, recipe: str = "seed-paper", **sett
     monitors: list[Monitor] = []
     draw = play_module.groove_picture
 
-    def overhear(capture: Capture, recipe: Recipe, monitor: Monitor, rate_hz: float) -> Figure:
+    def overhear(capture: Capture, pickup: Pickup, monitor: Monitor, **how: Any) -> Figure:
         monitors.append(monitor)
-        return draw(capture, recipe, monitor, rate_hz)
+        return draw(capture, pickup, monitor, **how)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(play_module, "groove_picture", overhear)

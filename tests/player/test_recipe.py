@@ -61,7 +61,7 @@ def test_the_shipped_recipe_holds_the_defaults_of_the_parts_but_where_it_says_so
 
 def test_an_empty_recipe_is_the_parts_as_they_come() -> None:
     recipe = recipe_of_table({})
-    assert recipe.pickup_for(Bench()) == SeedPaperPickup(Bench())
+    assert recipe.cartridge_for(Bench()) == SeedPaperPickup(Bench())
     assert recipe == replace(Recipe("unnamed"), pickup=recipe.pickup)
 
 
@@ -74,13 +74,13 @@ def test_what_is_written_arrives_in_the_part(table: dict[str, Any]) -> None:
     table["tonearm"]["smoother"]["corner_limits_hz"] = [900.0, 7000.0]
     table["preamp"]["passband"] = 0.8
     recipe = recipe_of_table(table)
-    assert recipe.pickup_for(Bench()).flow == HornSchunck(alpha=0.7, iterations=11)
+    assert recipe.cartridge_for(Bench()).flow == HornSchunck(alpha=0.7, iterations=11)
     assert recipe.smoother == KalmanSmoother(corner_limits_hz=(900.0, 7000.0))
     assert recipe.passband == 0.8
 
 
 def test_the_flow_with_the_groove_is_the_one_that_is_taken_unasked() -> None:
-    assert isinstance(recipe_of_table({}).pickup_for(Bench()).flow, GrooveHornSchunck)
+    assert isinstance(recipe_of_table({}).cartridge_for(Bench()).flow, GrooveHornSchunck)
 
 
 @pytest.mark.parametrize("flow", ["horn-schunck", "groove-horn-schunck"])
@@ -167,7 +167,7 @@ def test_an_unknown_key_is_named_with_its_table_and_the_nearest_known_one(
         ({"preamp": {"passband": True}}, "[preamp] passband = True", "a finite number"),
         ({"name": 3}, "name = 3", "a text"),
         ({"pickup": 3}, "pickup = 3", "a table [pickup]"),
-        ({"pickup": {"cartridge": "crystal"}}, "cartridge = 'crystal'", '"seed-paper"'),
+        ({"pickup": {"cartridge": "crystal"}}, "cartridge = 'crystal'", "seed-paper, texture-likelihood"),
         ({"pickup": {"flow": {"method": "lucas-kanade"}}}, "method = 'lucas-kanade'", "horn-schunck"),
     ],
 )
@@ -194,7 +194,7 @@ def test_a_value_out_of_its_range_is_refused_with_the_table_it_stands_in(table: 
 
 
 def test_a_whole_number_will_do_where_any_number_will() -> None:
-    assert recipe_of_table({"pickup": {"flow": {"alpha": 1}}}).pickup_for(Bench()).flow == GrooveHornSchunck(alpha=1)
+    assert recipe_of_table({"pickup": {"flow": {"alpha": 1}}}).cartridge_for(Bench()).flow == GrooveHornSchunck(alpha=1)
 
 
 def test_a_part_without_a_value_it_cannot_do_without_is_refused() -> None:
