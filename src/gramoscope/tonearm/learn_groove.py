@@ -18,7 +18,7 @@ from scipy import optimize
 from gramoscope.conventions import FloatArray
 from gramoscope.tonearm.groove_prior import GroovePrior, start, taylor
 from gramoscope.tonearm.level import LEAST_SAMPLES, OneDirection
-from gramoscope.tonearm.linear_gaussian import Moves, Readings, forward
+from gramoscope.tonearm.linear_gaussian import SOURCES, FilterState, Gate, Moves, Readings, forward
 
 GATE = 4.0
 """Samples further than this many standard errors from their prediction count as if they lay right there."""
@@ -69,7 +69,7 @@ def lesson(one: OneDirection, level: float) -> Lesson | None:
         return None
     place, variance = one.place_m[known], one.variance[known]
     h = np.repeat(taylor(np.zeros(1)), known.size, axis=0)
-    return Lesson(Readings(known - known[0], h, place - place[0], variance, variance), level)
+    return Lesson(Readings(known - known[0], np.zeros_like(known), h, place - place[0], variance, variance), level)
 
 
 def learn(
@@ -124,8 +124,8 @@ def _log_likelihood(lessons: Sequence[Lesson], step_m: float, prior: GroovePrior
         sigma = unit * one.level
         moves = Moves(a[None, None], sigma**2 * q[None, None], np.zeros(int(one.readings.bin[-1]) + 1, np.int64))
         covariance = start(at_rest, sigma, place_sigma_m=ANYWHERE_M)
-        mean = np.zeros(covariance.shape[0])
-        total += forward(moves, one.readings, mean=mean, covariance=covariance, gate=GATE).log_likelihood
+        begin = FilterState(np.zeros(covariance.shape[0]), covariance, np.zeros(SOURCES, np.int64))
+        total += forward(moves, one.readings, begin, gate=Gate(GATE)).log_likelihood
     return total
 
 

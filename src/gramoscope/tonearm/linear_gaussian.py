@@ -28,6 +28,7 @@ from gramoscope.conventions import BoolArray, FloatArray, IntArray
 
 STATES = 6
 """Size of a block. Known to the compiler, it makes the products of small matrices three times as fast."""
+SOURCES = 2
 LOG_2PI = float(np.log(2 * np.pi))
 
 
@@ -56,6 +57,8 @@ class Readings:
     ----------
     bin : int64 array, shape (reading,)
         Not falling, 0 … bins − 1.
+    source : int64 array, shape (reading,)
+        Who reads, 0 … `SOURCES` − 1.
     h : float64 array, shape (reading, block · n)
     value, variance : float64 arrays, shape (reading,)
         Finite; variance > 0.
@@ -64,10 +67,47 @@ class Readings:
     """
 
     bin: IntArray
+    source: IntArray
     h: FloatArray
     value: FloatArray
     variance: FloatArray
     gate_variance: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class FilterState:
+    """Where a filter begins or goes on: at a bin, before its readings.
+
+    Attributes
+    ----------
+    mean, covariance : float64 arrays, shapes (block · n,), (block · n, block · n)
+    missed : int64 array, shape (SOURCES,)
+        How many readings of each source were rejected in a row.
+    """
+
+    mean: FloatArray
+    covariance: FloatArray
+    missed: IntArray
+
+
+@dataclass(frozen=True)
+class Gate:
+    """When a reading is wild, and when it is the filter that is lost.
+
+    Parameters
+    ----------
+    width : float
+        A reading further than this many standard deviations from its prediction is rejected.
+    patience : int
+        After so many rejected readings of one source in a row the first part of each block, the place, is taken for
+        lost: it may be anywhere again, while its motion goes on.
+    anywhere : float
+        How little is then known of it, a standard deviation.
+    """
+
+    width: float = np.inf
+    patience: int = 2**31
+    anywhere: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +118,10 @@ class Filtered:
     ----------
     mean, covariance : float64 arrays, shapes (bin, block · n), (bin, block · n, block · n)
         Predicted at each bin, before its readings.
+    missed : int64 array, shape (bin, SOURCES)
+        See `FilterState`.
+    lost : bool array, shape (bin,)
+        Where the place was taken for lost.
     used : bool array, shape (reading,)
     innovation, spread : float64 arrays, shape (reading,)
         ν and S.
@@ -89,11 +133,17 @@ class Filtered:
 
     mean: FloatArray
     covariance: FloatArray
+    missed: IntArray
+    lost: BoolArray
     used: BoolArray
     innovation: FloatArray
     spread: FloatArray
     gain: FloatArray
     log_likelihood: float
+
+    def state(self, bin_: int) -> FilterState:
+        """Return where to go on at a bin."""
+        return FilterState(self.mean[bin_], self.covariance[bin_], self.missed[bin_])
 
 
 @numba.njit(cache=True, nogil=True)
@@ -176,20 +226,32 @@ def _observe(innovation, spread, gain, m, p):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _filter(a, q, model, places, h, value, variance, gate_variance, gate, allowed, m, p, means, covs, used, nu, spread, gain):  # type: ignore[no-untyped-def]  # fmt: skip
+def _lose(p, anywhere):  # type: ignore[no-untyped-def]
+    for i in range(0, p.shape[0], STATES):
+        p[i, i] += anywhere**2
+
+
+@numba.njit(cache=True, nogil=True)
+def _filter(a, q, model, places, source, h, value, variance, gate_variance, gate, patience, anywhere, allowed, lost, m, p, missed, means, covs, misses, used, nu, spread, gain):  # type: ignore[no-untyped-def]  # fmt: skip  # noqa: E501
     half, m_next, p_next = np.empty((STATES, STATES)), np.empty_like(m), np.empty_like(p)
     loglik = 0.0
     j = 0
     for k in range(means.shape[0]):
-        means[k], covs[k] = m, p
+        if missed.max() >= patience:
+            lost[k] = True
+            missed[:] = 0
+        if lost[k]:
+            _lose(p, anywhere)
+        means[k], covs[k], misses[k] = m, p, missed
         while j < places.size and places[j] == k:
-            seen = _times(p, h[j], gain[j])
-            nu[j] = value[j] - _dot(h[j], m)
-            spread[j] = seen + variance[j]
-            used[j] = allowed[j] and nu[j] ** 2 <= gate**2 * (seen + gate_variance[j])
-            distance = nu[j] ** 2 / spread[j] if used[j] else gate**2
             if allowed[j]:
+                seen = _times(p, h[j], gain[j])
+                nu[j] = value[j] - _dot(h[j], m)
+                spread[j] = seen + variance[j]
+                used[j] = nu[j] ** 2 <= gate**2 * (seen + gate_variance[j])
+                distance = nu[j] ** 2 / spread[j] if used[j] else gate**2
                 loglik -= 0.5 * (LOG_2PI + np.log(spread[j]) + distance)
+                missed[source[j]] = 0 if used[j] else missed[source[j]] + 1
             if used[j]:
                 _observe(nu[j], spread[j], gain[j], m, p)
             j += 1
@@ -201,11 +263,11 @@ def _filter(a, q, model, places, h, value, variance, gate_variance, gate, allowe
 def forward(
     moves: Moves,
     readings: Readings,
+    begin: FilterState,
     *,
-    mean: FloatArray,
-    covariance: FloatArray,
-    gate: float = np.inf,
+    gate: Gate | None = None,
     allowed: BoolArray | None = None,
+    lost: BoolArray | None = None,
 ) -> Filtered:
     """Run the Kalman filter over a grid.
 
@@ -213,26 +275,31 @@ def forward(
     ----------
     moves : Moves
     readings : Readings
-    mean, covariance : float64 arrays, shapes (block · n,), (block · n, block · n)
-        At the first bin, before its readings.
-    gate : float
-        A reading further than this many standard deviations from its prediction is not used.
+    begin : FilterState
+        At the first bin.
+    gate : Gate, optional
+        Without it all readings are used.
     allowed : bool array, shape (reading,), optional
         Readings that may be used at all; all of them if left out.
+    lost : bool array, shape (bin,), optional
+        Where the place is known to have been lost.
 
     Returns
     -------
     Filtered
     """
-    bins, size, n = moves.model.size, mean.size, readings.value.size
-    means, covs = np.empty((bins, size)), np.empty((bins, size, size))
+    bins, size, n = moves.model.size, begin.mean.size, readings.value.size
+    means, covs, misses = np.empty((bins, size)), np.empty((bins, size, size)), np.zeros((bins, SOURCES), np.int64)
     used, nu, spread, gain = np.zeros(n, np.bool_), np.empty(n), np.empty(n), np.empty((n, size))
     may = np.ones(n, np.bool_) if allowed is None else allowed
+    lost = np.zeros(bins, np.bool_) if lost is None else lost.copy()
+    rule = gate or Gate()
     loglik = _filter(
-        moves.a, moves.q, moves.model, readings.bin, readings.h, readings.value, readings.variance,
-        readings.gate_variance, gate, may, mean.copy(), covariance.copy(), means, covs, used, nu, spread, gain,
+        moves.a, moves.q, moves.model, readings.bin, readings.source, readings.h, readings.value, readings.variance,
+        readings.gate_variance, rule.width, rule.patience, rule.anywhere, may, lost, begin.mean.copy(),
+        begin.covariance.copy(), begin.missed.copy(), means, covs, misses, used, nu, spread, gain,
     )  # fmt: skip
-    return Filtered(means, covs, used, nu, spread, gain, float(loglik))
+    return Filtered(means, covs, misses, lost, used, nu, spread, gain, float(loglik))
 
 
 @dataclass(frozen=True, eq=False)

@@ -80,7 +80,7 @@ class PlaceSamples:
         """
         row = taylor(self.arc_m / step_m - self.bin)
         h = np.concatenate([row, row * gains[self.wall][:, None]], axis=1)
-        return Readings(self.bin - first_bin, h, self.place_m, self.variance, self.gate_variance)
+        return Readings(self.bin - first_bin, self.wall, h, self.place_m, self.variance, self.gate_variance)
 
 
 def samples_of(stretch: Stretch, step_m: float) -> PlaceSamples:
