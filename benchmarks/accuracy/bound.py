@@ -10,9 +10,10 @@ covariance
     C_f(y, y′) = ∫ S(f, k) H(R_y, κ) H(R_y′, κ) cos 2πk(y − y′) dk + noise² δ,   κ² = f² + k²,   H = 2 J₁(x)/x at x = 2πRκ,
 
 and a column tells ∫ ½ tr(C⁻¹ dC C⁻¹ dC) df, f from −½ to ½, about the place of its stripe (P. Whittle, 1953; S. Kay,
-Fundamentals of Statistical Signal Processing I, 1993, section 3.9). Rows are blurred as *they* would be, not as the points were that light
-them. No unbiased reading can have errors of place with a smaller density, and the error of the velocity is that times
-(2πf)². Left out: what the skewness of a texture tells, overlapping groups, the mixed zone at the glass edge, the opposite wall.
+Fundamentals of Statistical Signal Processing I, 1993, section 3.9). Each row is blurred by its own disc, not by those of the
+points that light it. No unbiased reading can have errors of place with a smaller density, and the error of the velocity has
+(2πf)² times that. Left out: what the skewness of a texture tells, overlapping groups, the mixed zone at the glass edge, the
+opposite wall.
 
     python -m benchmarks.accuracy.bound
 """
