@@ -167,17 +167,24 @@ class TexturePickup:
             Offsets with their errors, every 8 columns; NaN and flags where a wall could not be read. Slopes are NaN.
         """
         group, exposure_flags = self.cartridge.exposure.sort_out(group)
-        if not group.valid.any() or not self.lessons:
-            return self._lost(group, exposure_flags)
+        if not group.valid.any():
+            return self._lost(group, exposure_flags, group.problems)
+        if not self.taught:
+            return self._lost(group, exposure_flags, (*group.problems, f"group {group.number} is not read: {UNTAUGHT}"))
         canvas, step_m = registered(group)
         stretch, found = self._read(canvas, group)
         head, tail = self._textures(group, canvas)
         return replace(self._trace(group, stretch, found, exposure_flags, step_m), head=head, tail=tail)
 
+    @property
+    def taught(self) -> bool:
+        """Whether the passage was long enough to learn the texture of a stripe at least."""
+        return any(stripe is not None for lesson in self.lessons[-1:] for stripe in lesson.whole.stripes)
+
     def sketch(self, group: FrameGroup) -> Sketch | None:
         """Return one frame and the stripes that were read in it; None when no frame is usable."""
         group, _ = self.cartridge.exposure.sort_out(group)
-        if not group.valid.any() or not self.lessons:
+        if not group.valid.any() or not self.taught:
             return None
         stretch, found = self._read(registered(group)[0], group)
         image = group.images[int(np.flatnonzero(group.valid)[0])]
@@ -257,7 +264,7 @@ class TexturePickup:
             Texture(tail, start + (width - length) * pitch, pitch, stage),
         )
 
-    def _lost(self, group: FrameGroup, flags: Quality) -> WallTrace:
+    def _lost(self, group: FrameGroup, flags: Quality, problems: tuple[str, ...]) -> WallTrace:
         """A stretch of which nothing can be said."""
         samples = group.images.shape[2] // STRIDE_PX
         nothing = np.full((2, samples), np.nan)
@@ -271,11 +278,12 @@ class TexturePickup:
             slope_sigma=nothing,
             correlation_samples=1.0,
             flags=no_flags(2, samples) | np.uint16(flags | UNSEEN),
-            problems=group.problems,
+            problems=problems,
         )
 
 
 UNSEEN = Quality.NO_STRIPE | Quality.INTERPOLATED
+UNTAUGHT = "too little of the stripes is seen to learn their texture; the recipe seed-paper reads single groups"
 
 
 def registered(group: FrameGroup) -> tuple[Canvas, FloatArray]:
