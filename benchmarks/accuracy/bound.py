@@ -234,16 +234,31 @@ def sharp_share(stripe: SharpStripe) -> float:
     return float(np.sqrt(_scale(replace(open_eye, contrast=1.0)) / _scale(replace(stripe, contrast=1.0))))
 
 
-def scene_density_m2_hz(scene: Scene, *, reach_px: int = REACH_PX) -> float:
-    """Return the least density of the error of place that all stripes of a scene allow together.
+def scene_density_m2_hz(scene: Scene, *, channel: int | None = None, reach_px: int = REACH_PX) -> float:
+    """Return the least density of the error of place that a scene allows.
 
-    Of the direction of the cut, the other one being known: all stripes tell of either.
+    Parameters
+    ----------
+    scene : Scene
+    channel : int, optional
+        Of a 45/45 groove, 0 for left: along the normal of its wall, by the stripes of that wall. When not given, in the
+        direction of the cut (lateral for 45/45), the other direction being known, by all stripes.
+    reach_px : int
+        As in `information`.
+
+    Returns
+    -------
+    float
+        m²/Hz, one-sided.
     """
     bench = scene.bench
-    told = information(stripe_of_scene(scene), reach_px=reach_px) * len(bench.stripes())
-    if bench.disc.cut == "vertical":
+    stripes = [stripe for stripe in bench.stripes() if channel in (None, stripe.wall)]
+    told = information(stripe_of_scene(scene), reach_px=reach_px) * len(stripes)
+    if channel is not None:
+        told *= 2
+    elif bench.disc.cut == "vertical":
         told /= float(np.tan(bench.disc.wall_angle_rad)) ** 2
-    speed_m_s = float(bench.rotation.speed_at_m_s(bench.passage_length_m / 2))
+    speed_m_s = float(bench.rotation.speed_at_m_s(0.0))
     return place_density_m2_hz(told, pixel_pitch_m=bench.sensor.pixel_pitch_m, groove_speed_m_s=speed_m_s)
 
 
