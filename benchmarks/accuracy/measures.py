@@ -63,8 +63,8 @@ def separation_db(truth: FloatArray, heard: FloatArray, *, rate_hz: float, band_
     """Return how far the sound of one channel lies below itself in the other, the worse of both ways round.
 
     With one channel driven, 10 lg of the power heard in the driven channel over that in the other: noise counts as crosstalk.
-    With both driven each channel heard is fitted by both true ones, and the leak is what the fit gives to the wrong one, at
-    the strength that it has for sounds that are equally loud.
+    With both driven each channel heard is fitted by both true ones, and a sound's gain in its own channel is compared with that
+    in the other: noise does not count.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def separation_db(truth: FloatArray, heard: FloatArray, *, rate_hz: float, band_
         powers = np.mean(b**2, axis=0)
         return float(10 * np.log10(powers[driven[0]] / powers[1 - driven[0]]))
     gains = np.linalg.lstsq(a, b, rcond=None)[0]
-    leaks = np.abs([gains[1, 0] / gains[0, 0], gains[0, 1] / gains[1, 1]])
+    leaks = np.abs([gains[0, 1] / gains[0, 0], gains[1, 0] / gains[1, 1]])
     return float(-20 * np.log10(max(leaks.max(), 1e-15)))
 
 
