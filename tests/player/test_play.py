@@ -133,6 +133,6 @@ def test_progress_is_told_after_every_group(capture: Path, tmp_path: Path) -> No
         load_recipe("seed-paper"),
         tmp_path / "out",
         Settings(workers=2),
-        progress=lambda done, total: told.append((done, total)),
+        progress=lambda done, total, what: told.append((done, total)),
     )
     assert told == [(number, 8) for number in range(1, 9)]

@@ -94,8 +94,8 @@ class Terminal:
             sys.stdout.write(json_text(values).rstrip() + "\n")
 
     @contextmanager
-    def progress(self, title: str) -> Iterator[Callable[[int, int], None] | None]:
-        """Show a progress bar while the block runs; yields what to call with (done, of how many)."""
+    def progress(self, title: str) -> Iterator[Callable[..., None] | None]:
+        """Show a progress bar while the block runs; yields what to call with (done, of how many, of what)."""
         if self.quiet:
             yield None
             return
@@ -110,7 +110,7 @@ class Terminal:
         with Progress(*columns, console=Console(stderr=True)) as bar:
             task = bar.add_task(title, total=None)
             try:
-                yield lambda done, total: bar.update(task, completed=done, total=total)
+                yield lambda done, total, what=title: bar.update(task, completed=done, total=total, description=what)
             except BaseException:
                 # a bar that stands still has nothing to say beside a message
                 bar.live.transient = True

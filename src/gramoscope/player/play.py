@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -32,7 +32,13 @@ from gramoscope.preamp.resample import Resampler
 from gramoscope.signal_path import Audio, WallTrace
 from gramoscope.tonearm.follow import Tonearm
 
-Progress = Callable[[int, int], None]
+
+class Progress(Protocol):
+    """Told how far things are."""
+
+    def __call__(self, done: int, total: int, what: str, /) -> None:
+        """So much is done of how much of what."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -73,7 +79,7 @@ def play(
         Where `flat.wav`, `equalised.wav`, `report.json` and `groove.png` go.
     settings : Settings
     progress : callable, optional
-        Told how many groups are read, and of how many.
+        Told how much is done, of how much, and of what ("Learning", "Playing").
 
     Returns
     -------
@@ -120,11 +126,16 @@ def learned(capture: Capture, recipe: Recipe, workers: int, *, progress: Progres
     recipe : Recipe
     workers : int
     progress : callable, optional
-        Told how much is learned, and of how much.
+        Told how much is done, of how much, and of what.
     """
     with spreading(workers) as spread:
         cartridge = recipe.cartridge_for(capture.bench)
-        return cartridge.learn(capture.group, capture.group_count, spread, progress)
+
+        def told(done: int, total: int) -> None:
+            if progress is not None:
+                progress(done, total, "Learning")
+
+        return cartridge.learn(capture.group, capture.group_count, spread, told)
 
 
 def _picked_up(
@@ -140,7 +151,7 @@ def _picked_up(
         hashes.add(sums)
         monitor.picked_up(trace, frames_lost)
         if progress is not None:
-            progress(monitor.groups, capture.group_count)
+            progress(monitor.groups, capture.group_count, "Playing")
         yield trace
 
 
