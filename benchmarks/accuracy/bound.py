@@ -194,8 +194,8 @@ def snr_db(signal_m_s: float, noise_m_s: float) -> float:
 def stripe_of_scene(scene: Scene) -> SharpStripe:
     """Return the stripes of a simulated scene: texture, light, camera and frames of a group as they are, free of damage.
 
-    Light is the mean over all stripes, in the middle of the picture. Rendered films have a tenth less contrast (sources of
-    finite size, vignetting), so that their true bound lies up to 1 dB lower.
+    Light is the mean over all stripes at rest. Rendered films have a twentieth less contrast, because their sources and pixels
+    are not points: their true bound lies half a decibel lower.
     """
     bench = scene.bench
     pitch_m, angle_rad = bench.sensor.pixel_pitch_m, bench.disc.wall_angle_rad
@@ -218,7 +218,11 @@ def _wall_level(scene: Scene) -> float:
     slope = np.array([steep if stripe.wall == 0 else -steep for stripe in stripes])
     depth = np.array([-stripe.depth_below_land_m for stripe in stripes])
     bright = scene.illumination.brightness(np.zeros(len(slope)), slope, height_m=depth)
-    return float(bright.mean()) * scene.illumination.exposure * scene.rig.dim
+    sensor = scene.bench.sensor
+    field = scene.illumination.field(height_px=sensor.height_px, width_px=sensor.width_px)
+    rows = np.clip(np.rint([stripe.row for stripe in stripes]).astype(int), 0, sensor.height_px - 1)
+    seen = bright * field[rows].mean(axis=1)
+    return float(seen.mean()) * scene.illumination.exposure * scene.rig.dim
 
 
 def pixel_noise(scene: Scene, *, level: float) -> float:
