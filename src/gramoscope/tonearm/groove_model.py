@@ -9,14 +9,13 @@ more, for a second pass, and so on until nothing changes. So what was rejected b
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from gramoscope.conventions import BoolArray, FloatArray, IntArray
 from gramoscope.tonearm.groove_prior import SLOPE, STATES, GroovePrior, start
 from gramoscope.tonearm.linear_gaussian import (
-    SOURCES,
     Filtered,
     FilterState,
     Gate,
@@ -24,13 +23,16 @@ from gramoscope.tonearm.linear_gaussian import (
     Readings,
     Smoothed,
     backward,
+    blank,
     forward,
 )
 
 ANYWHERE_M = 1e-3
 """How little is known of where a passage begins, once its first sample is taken off."""
 PATIENCE = 64
-"""A wall that was seen so often where it was not expected has moved: a fifth of a millimetre."""
+"""A wall that was seen so often where it was not expected has moved, or the filter has: a fifth of a millimetre."""
+DOUBT = 100.0
+"""How much surer than it is by right the first pass may be, as a variance, when it has lost a wall."""
 ROUNDS = 4
 """At most so often is looked again which readings are outliers."""
 SLOPES = np.array([SLOPE, STATES + SLOPE])
@@ -128,8 +130,7 @@ class PassState:
 
 def beginning(model: GrooveModel, first_bin: int) -> PassState:
     """Return the state before anything was seen."""
-    nothing = FilterState(np.zeros(2 * STATES), model.covariance, np.zeros(SOURCES, np.int64))
-    return PassState(first_bin, nothing, nothing)
+    return PassState(first_bin, blank(model.covariance), blank(model.covariance))
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,13 +173,26 @@ def robustly(steps: Moves, readings: Readings, trusted: BoolArray, begin: PassSt
     -------
     Followed
     """
-    rule = Gate(gate, PATIENCE, ANYWHERE_M)
+    rule = Gate(gate, PATIENCE, ANYWHERE_M, DOUBT)
     first = forward(steps, readings, begin.first, gate=rule, allowed=trusted)
     accepted = backward(steps, readings, first, wanted=SLOPES[:0]).distance <= gate
+    lost, missed = _where_it_was_lost(first, readings)
+    accepted |= missed & trusted
     for _ in range(ROUNDS):
-        last = forward(steps, readings, begin.last, gate=replace(rule, width=np.inf), allowed=accepted, lost=first.lost)
+        last = forward(steps, readings, begin.last, gate=Gate(anywhere=ANYWHERE_M), allowed=accepted, lost=lost)
         smoothed = backward(steps, readings, last, wanted=SLOPES)
         used, accepted = accepted, smoothed.distance <= gate
         if np.array_equal(used, accepted):
             break
     return Followed(smoothed, used, first, last)
+
+
+def _where_it_was_lost(first: Filtered, readings: Readings) -> tuple[BoolArray, BoolArray]:
+    """The bins where the place was lost, not those where that was noticed; and the readings that were missed between."""
+    lost, missed = np.zeros_like(first.lost), np.zeros(readings.bin.size, np.bool_)
+    for noticed in np.flatnonzero(first.lost):
+        for source in np.flatnonzero(first.missed[noticed] >= PATIENCE / 2):
+            begun = max(int(noticed - first.since[noticed, source]), 0)
+            lost[begun] = True
+            missed |= (readings.source == source) & (readings.bin >= begun) & (readings.bin < noticed)
+    return lost, missed

@@ -18,7 +18,7 @@ from scipy import optimize
 from gramoscope.conventions import FloatArray
 from gramoscope.tonearm.groove_prior import GroovePrior, start, taylor
 from gramoscope.tonearm.level import LEAST_SAMPLES, OneDirection
-from gramoscope.tonearm.linear_gaussian import SOURCES, FilterState, Gate, Moves, Readings, forward
+from gramoscope.tonearm.linear_gaussian import Gate, Moves, Readings, blank, forward
 
 GATE = 4.0
 """Samples further than this many standard errors from their prediction count as if they lay right there."""
@@ -124,8 +124,7 @@ def _log_likelihood(lessons: Sequence[Lesson], step_m: float, prior: GroovePrior
         sigma = unit * one.level
         moves = Moves(a[None, None], sigma**2 * q[None, None], np.zeros(int(one.readings.bin[-1]) + 1, np.int64))
         covariance = start(at_rest, sigma, place_sigma_m=ANYWHERE_M)
-        begin = FilterState(np.zeros(covariance.shape[0]), covariance, np.zeros(SOURCES, np.int64))
-        total += forward(moves, one.readings, begin, gate=Gate(GATE)).log_likelihood
+        total += forward(moves, one.readings, blank(covariance), gate=Gate(GATE)).log_likelihood
     return total
 
 

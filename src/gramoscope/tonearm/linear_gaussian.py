@@ -14,7 +14,7 @@ covariances are no trouble to it. What all *other* observations say of one of th
 e = ν/S − K·r and D = 1/S + KᵀNK the residual against them is e/D, and 1/D its variance (de Jong, *A cross-validation filter
 for time series models*, Biometrika 75, 1988).
 
-The kernels take C-contiguous float64 arrays; `filter_reference` and `smooth_reference` are the same in NumPy.
+The kernels take C-contiguous float64 arrays; `smooth_reference` does the same in NumPy, the way of the textbooks.
 """
 
 from __future__ import annotations
@@ -23,12 +23,15 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
+from scipy import linalg
 
 from gramoscope.conventions import BoolArray, FloatArray, IntArray
 
 STATES = 6
 """Size of a block. Known to the compiler, it makes the products of small matrices three times as fast."""
 SOURCES = 2
+FORGIVENESS = 8
+"""A used reading makes good so many rejected ones: a filter that goes astray still finds something to agree with."""
 LOG_2PI = float(np.log(2 * np.pi))
 
 
@@ -81,13 +84,21 @@ class FilterState:
     Attributes
     ----------
     mean, covariance : float64 arrays, shapes (block · n,), (block · n, block · n)
-    missed : int64 array, shape (SOURCES,)
-        How many readings of each source were rejected in a row.
+    missed, since : int64 arrays, shape (SOURCES,)
+        How many more readings of each source were rejected than used (one used reading counts `FORGIVENESS`), and for
+        how many bins there has been such a surplus.
     """
 
     mean: FloatArray
     covariance: FloatArray
     missed: IntArray
+    since: IntArray
+
+
+def blank(covariance: FloatArray) -> FilterState:
+    """Return the state of a filter that has seen nothing: zero mean, with a covariance."""
+    none = np.zeros(SOURCES, np.int64)
+    return FilterState(np.zeros(covariance.shape[0]), covariance, none, none)
 
 
 @dataclass(frozen=True)
@@ -99,15 +110,18 @@ class Gate:
     width : float
         A reading further than this many standard deviations from its prediction is rejected.
     patience : int
-        After so many rejected readings of one source in a row the first part of each block, the place, is taken for
-        lost: it may be anywhere again, while its motion goes on.
+        With a surplus of so many rejected readings of one source the first part of each block, the place, is taken for
+        lost: it may be anywhere again.
     anywhere : float
         How little is then known of it, a standard deviation.
+    doubt : float
+        By how much the covariance of everything grows then.
     """
 
     width: float = np.inf
     patience: int = 2**31
     anywhere: float = 0.0
+    doubt: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,8 +132,8 @@ class Filtered:
     ----------
     mean, covariance : float64 arrays, shapes (bin, block · n), (bin, block · n, block · n)
         Predicted at each bin, before its readings.
-    missed : int64 array, shape (bin, SOURCES)
-        See `FilterState`.
+    missed, since : int64 arrays, shape (bin, SOURCES)
+        See `FilterState`; where the place was lost, as they were before they were set to zero.
     lost : bool array, shape (bin,)
         Where the place was taken for lost.
     used : bool array, shape (reading,)
@@ -134,6 +148,7 @@ class Filtered:
     mean: FloatArray
     covariance: FloatArray
     missed: IntArray
+    since: IntArray
     lost: BoolArray
     used: BoolArray
     innovation: FloatArray
@@ -143,7 +158,8 @@ class Filtered:
 
     def state(self, bin_: int) -> FilterState:
         """Return where to go on at a bin."""
-        return FilterState(self.mean[bin_], self.covariance[bin_], self.missed[bin_])
+        kept = not self.lost[bin_]
+        return FilterState(self.mean[bin_], self.covariance[bin_], kept * self.missed[bin_], kept * self.since[bin_])
 
 
 @numba.njit(cache=True, nogil=True)
@@ -226,32 +242,44 @@ def _observe(innovation, spread, gain, m, p):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _lose(p, anywhere):  # type: ignore[no-untyped-def]
+def _lose(p, anywhere, doubt):  # type: ignore[no-untyped-def]
+    p *= doubt
     for i in range(0, p.shape[0], STATES):
         p[i, i] += anywhere**2
 
 
 @numba.njit(cache=True, nogil=True)
-def _filter(a, q, model, places, source, h, value, variance, gate_variance, gate, patience, anywhere, allowed, lost, m, p, missed, means, covs, misses, used, nu, spread, gain):  # type: ignore[no-untyped-def]  # fmt: skip  # noqa: E501
+def _judge(used, source, missed, since):  # type: ignore[no-untyped-def]
+    missed[source] = max(missed[source] - FORGIVENESS, 0) if used else missed[source] + 1
+    if missed[source] == 0:
+        since[source] = 0
+
+
+@numba.njit(cache=True, nogil=True)
+def _filter(a, q, model, places, source, h, value, variance, gate_variance, rule, allowed, lost, m, p, missed, since, means, covs, misses, sinces, used, nu, spread, gain):  # type: ignore  # fmt: skip  # noqa: E501
+    width, patience, anywhere, doubt = rule
     half, m_next, p_next = np.empty((STATES, STATES)), np.empty_like(m), np.empty_like(p)
     loglik = 0.0
     j = 0
     for k in range(means.shape[0]):
+        misses[k], sinces[k] = missed, since
         if missed.max() >= patience:
             lost[k] = True
             missed[:] = 0
+            since[:] = 0
         if lost[k]:
-            _lose(p, anywhere)
-        means[k], covs[k], misses[k] = m, p, missed
+            _lose(p, anywhere, doubt)
+        means[k], covs[k] = m, p
+        since += missed > 0
         while j < places.size and places[j] == k:
             if allowed[j]:
                 seen = _times(p, h[j], gain[j])
                 nu[j] = value[j] - _dot(h[j], m)
                 spread[j] = seen + variance[j]
-                used[j] = nu[j] ** 2 <= gate**2 * (seen + gate_variance[j])
-                distance = nu[j] ** 2 / spread[j] if used[j] else gate**2
+                used[j] = nu[j] ** 2 <= width**2 * (seen + gate_variance[j])
+                distance = nu[j] ** 2 / spread[j] if used[j] else width**2
                 loglik -= 0.5 * (LOG_2PI + np.log(spread[j]) + distance)
-                missed[source[j]] = 0 if used[j] else missed[source[j]] + 1
+                _judge(used[j], source[j], missed, since)
             if used[j]:
                 _observe(nu[j], spread[j], gain[j], m, p)
             j += 1
@@ -289,17 +317,19 @@ def forward(
     Filtered
     """
     bins, size, n = moves.model.size, begin.mean.size, readings.value.size
-    means, covs, misses = np.empty((bins, size)), np.empty((bins, size, size)), np.zeros((bins, SOURCES), np.int64)
+    means, covs = np.empty((bins, size)), np.empty((bins, size, size))
+    misses, sinces = np.empty((bins, SOURCES), np.int64), np.empty((bins, SOURCES), np.int64)
     used, nu, spread, gain = np.zeros(n, np.bool_), np.empty(n), np.empty(n), np.empty((n, size))
     may = np.ones(n, np.bool_) if allowed is None else allowed
     lost = np.zeros(bins, np.bool_) if lost is None else lost.copy()
     rule = gate or Gate()
     loglik = _filter(
         moves.a, moves.q, moves.model, readings.bin, readings.source, readings.h, readings.value, readings.variance,
-        readings.gate_variance, rule.width, rule.patience, rule.anywhere, may, lost, begin.mean.copy(),
-        begin.covariance.copy(), begin.missed.copy(), means, covs, misses, used, nu, spread, gain,
+        readings.gate_variance, (rule.width, rule.patience, rule.anywhere, rule.doubt), may, lost, begin.mean.copy(),
+        begin.covariance.copy(), begin.missed.copy(), begin.since.copy(), means, covs, misses, sinces, used, nu, spread,
+        gain,
     )  # fmt: skip
-    return Filtered(means, covs, misses, lost, used, nu, spread, gain, float(loglik))
+    return Filtered(means, covs, misses, sinces, lost, used, nu, spread, gain, float(loglik))
 
 
 @dataclass(frozen=True, eq=False)
@@ -388,3 +418,34 @@ def backward(moves: Moves, readings: Readings, filtered: Filtered, *, wanted: In
         filtered.mean, filtered.covariance, wanted, mean, sigma, distance,
     )  # fmt: skip
     return Smoothed(mean, sigma, distance)
+
+
+def smooth_reference(
+    moves: Moves, readings: Readings, begin: FilterState, *, wanted: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return mean and standard error of the wanted parts of the state by Kalman, Rauch, Tung and Striebel.
+
+    All readings are used. For parameters see `forward` and `backward`.
+    """
+    m, p = begin.mean, begin.covariance
+    predicted, filtered = [], []
+    whole = [(linalg.block_diag(*a), linalg.block_diag(*q)) for a, q in zip(moves.a, moves.q, strict=True)]
+    for k, model in enumerate(moves.model):
+        predicted.append((m, p))
+        here = readings.bin == k
+        h = readings.h[here]
+        gain = p @ h.T @ np.linalg.inv(h @ p @ h.T + np.diag(readings.variance[here]))
+        m, p = m + gain @ (readings.value[here] - h @ m), p - gain @ h @ p
+        filtered.append((m, p))
+        a, q = whole[model]
+        m, p = a @ m, a @ p @ a.T + q
+    m, p = filtered[-1]
+    smoothed = [(m, p)]
+    for k in range(moves.model.size - 2, -1, -1):
+        a = whole[moves.model[k]][0]
+        gain = filtered[k][1] @ a.T @ np.linalg.inv(predicted[k + 1][1])
+        m = filtered[k][0] + gain @ (m - predicted[k + 1][0])
+        p = filtered[k][1] + gain @ (p - predicted[k + 1][1]) @ gain.T
+        smoothed.append((m, p))
+    means, covariances = (np.array(values) for values in zip(*smoothed[::-1], strict=True))
+    return means[:, wanted], np.sqrt(covariances[:, wanted, wanted])
