@@ -45,6 +45,10 @@ group_step_um = 469.53
 """
 
 
+QUICKLY = ("--recipe", "seed-paper")
+"""Reads a film of a few groups, and fast."""
+
+
 @dataclass(frozen=True)
 class Answer:
     """How a command ended and what it said."""
@@ -67,6 +71,12 @@ def gramoscope(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPat
         return Answer(code, out, err)
 
     return run
+
+
+@pytest.fixture(scope="session")
+def quickly() -> tuple[str, ...]:
+    """Options for playing films of a few groups, which teach the default recipe nothing."""
+    return QUICKLY
 
 
 @pytest.fixture(scope="session")

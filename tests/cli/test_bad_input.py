@@ -161,12 +161,21 @@ def test_a_capture_in_which_no_groove_is_seen_is_refused_after_it_was_read(
 ) -> None:
     for file in (copy_of / "frames").iterdir():
         file.write_bytes(b"II*\0 not a picture")
-    answer = gramoscope("play", copy_of, "--out", tmp_path / "o")
-    assert answer.code == 2
-    assert "the groove was not found in any of 6 groups" in answer.err
-    assert "Needed:" in answer.err
-    assert "Try:" in answer.err
-    assert not (tmp_path / "o").exists()
+    for recipe in ("best", "seed-paper"):
+        answer = gramoscope("play", copy_of, "--out", tmp_path / "o", "--recipe", recipe)
+        assert answer.code == 2
+        assert "the groove was not found in any of 6 groups" in answer.err
+        assert "Needed:" in answer.err
+        assert "Try:" in answer.err
+        assert not (tmp_path / "o").exists()
+
+
+def test_a_film_too_short_to_learn_from_is_refused_and_told_what_reads_it(
+    refused: Callable[..., str], capture: Path, tmp_path: Path
+) -> None:
+    said = refused("play", capture, "--out", tmp_path / "o", "--recipe", "best")
+    assert "too little of the stripes is seen to learn their texture" in said
+    assert "seed-paper" in said
 
 
 COMPARE_REFUSED = [

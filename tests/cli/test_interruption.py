@@ -58,9 +58,9 @@ MOMENTS = [("out/.flat.wav.*.part", 0.0), ("out/.flat.wav.*.part", 0.4), ("out/.
 
 @pytest.mark.parametrize(("sign", "wait_s"), MOMENTS, ids=["at once", "while reading", "while drawing"])
 def test_playing_stopped_by_ctrl_c_leaves_nothing(
-    longer_capture: Path, tmp_path: Path, sign: str, wait_s: float
+    longer_capture: Path, quickly: tuple[str, ...], tmp_path: Path, sign: str, wait_s: float
 ) -> None:
-    play = ("play", longer_capture, "--out", tmp_path / "out")
+    play = ("play", longer_capture, "--out", tmp_path / "out", *quickly)
     code, said = _signalled(tmp_path, sign, signal.SIGINT, *play, wait_s=wait_s)
     assert code == 130, said
     assert "Traceback" not in said
@@ -69,12 +69,13 @@ def test_playing_stopped_by_ctrl_c_leaves_nothing(
 
 
 def test_playing_stopped_by_ctrl_c_leaves_an_earlier_transfer_as_it_was(
-    gramoscope: Callable[..., Any], capture: Path, longer_capture: Path, tmp_path: Path
+    gramoscope: Callable[..., Any], capture: Path, longer_capture: Path, quickly: tuple[str, ...], tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    assert gramoscope("play", capture, "--out", out, "--quiet").code == 0
+    assert gramoscope("play", capture, "--out", out, "--quiet", *quickly).code == 0
     before = {path.name: path.read_bytes() for path in out.iterdir()}
-    code, said = _signalled(out, ".report.json.*.part", signal.SIGINT, "play", longer_capture, "--out", out)
+    play = ("play", longer_capture, "--out", out, *quickly)
+    code, said = _signalled(out, ".report.json.*.part", signal.SIGINT, *play)
     assert code == 130, said
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
 
@@ -93,13 +94,13 @@ def test_filming_stopped_by_ctrl_c_leaves_nothing(
 
 @pytest.mark.parametrize("sign", ["out/.flat.wav.*.part", "out/.report.json.*.part"])
 def test_playing_killed_leaves_only_hidden_files_and_can_be_repeated(
-    gramoscope: Callable[..., Any], longer_capture: Path, tmp_path: Path, sign: str
+    gramoscope: Callable[..., Any], longer_capture: Path, quickly: tuple[str, ...], tmp_path: Path, sign: str
 ) -> None:
     out = tmp_path / "out"
-    code, _ = _signalled(tmp_path, sign, signal.SIGKILL, "play", longer_capture, "--out", out)
+    code, _ = _signalled(tmp_path, sign, signal.SIGKILL, "play", longer_capture, "--out", out, *quickly)
     assert code == -signal.SIGKILL
     assert all(name.startswith(".") for name in _names(out))
-    assert gramoscope("play", longer_capture, "--out", out, "--quiet").code == 0
+    assert gramoscope("play", longer_capture, "--out", out, "--quiet", *quickly).code == 0
     report = json.loads((out / "report.json").read_text(encoding="utf-8"))
     for name in ("flat.wav", "equalised.wav"):
         assert soundfile.info(out / name).duration == pytest.approx(report["seconds"])

@@ -17,11 +17,11 @@ COMMANDS = ("demo", "film", "play", "compare", "info", "recipe")
 
 
 @pytest.fixture(scope="session")
-def heard(here: Path, capture: Path) -> Path:
+def heard(here: Path, capture: Path, quickly: tuple[str, ...]) -> Path:
     """The capture, played by the command."""
     from gramoscope.cli.main import main
 
-    assert main(["play", str(capture), "--out", str(here / "heard"), "--quiet"]) == 0
+    assert main(["play", str(capture), "--out", str(here / "heard"), "--quiet", *quickly]) == 0
     return here / "heard"
 
 
@@ -30,9 +30,9 @@ def _film(tone: Path, bench: Path, folder: Path) -> tuple[Any, ...]:
 
 
 def test_play_tells_what_the_transfer_is_worth_and_where_it_lies(
-    gramoscope: Callable[..., Any], capture: Path, tmp_path: Path
+    gramoscope: Callable[..., Any], capture: Path, quickly: tuple[str, ...], tmp_path: Path
 ) -> None:
-    answer = gramoscope("play", capture, "--out", tmp_path / "o")
+    answer = gramoscope("play", capture, "--out", tmp_path / "o", *quickly)
     assert answer.code == 0
     for words in ("0.003 s in", "recipe seed-paper", "6 read, 0 lost; 0 frames lost", "cm/s rms", "dB below the sound"):
         assert words in answer.out
@@ -43,9 +43,11 @@ def test_play_tells_what_the_transfer_is_worth_and_where_it_lies(
     assert "Playing" not in answer.out
 
 
-def test_play_names_the_groups_that_are_lost(gramoscope: Callable[..., Any], copy_of: Path, tmp_path: Path) -> None:
+def test_play_names_the_groups_that_are_lost(
+    gramoscope: Callable[..., Any], copy_of: Path, quickly: tuple[str, ...], tmp_path: Path
+) -> None:
     (copy_of / "frames" / "g000002.tif").unlink()
-    answer = gramoscope("play", copy_of, "--out", tmp_path / "o")
+    answer = gramoscope("play", copy_of, "--out", tmp_path / "o", *quickly)
     assert answer.code == 0
     assert "5 read, 1 lost (2); 4 frames lost" in answer.out
     assert "Found: group 2, frames 0 … 3" in answer.out
@@ -72,11 +74,17 @@ def test_of_a_long_sound_a_moment_is_filmed_and_that_is_said(
 
 
 def test_quiet_commands_say_nothing(
-    gramoscope: Callable[..., Any], tone: Path, bench: Path, capture: Path, heard: Path, tmp_path: Path
+    gramoscope: Callable[..., Any],
+    tone: Path,
+    bench: Path,
+    capture: Path,
+    heard: Path,
+    quickly: tuple[str, ...],
+    tmp_path: Path,
 ) -> None:
     for command in (
         _film(tone, bench, tmp_path / "c"),
-        ("play", capture, "--out", tmp_path / "o"),
+        ("play", capture, "--out", tmp_path / "o", *quickly),
         ("compare", heard / "flat.wav", heard / "flat.wav", "--band", 900, 9000),
         ("info", capture),
     ):
@@ -85,11 +93,17 @@ def test_quiet_commands_say_nothing(
 
 
 def test_json_is_all_that_stands_on_standard_output(
-    gramoscope: Callable[..., Any], tone: Path, bench: Path, capture: Path, heard: Path, tmp_path: Path
+    gramoscope: Callable[..., Any],
+    tone: Path,
+    bench: Path,
+    capture: Path,
+    heard: Path,
+    quickly: tuple[str, ...],
+    tmp_path: Path,
 ) -> None:
     filmed = json.loads(gramoscope(*_film(tone, bench, tmp_path / "c"), "--json").out)
     assert (filmed["groups"], filmed["capture"]) == (3, str(tmp_path / "c"))
-    played = json.loads(gramoscope("play", capture, "--out", tmp_path / "o", "--json", "--quiet").out)
+    played = json.loads(gramoscope("play", capture, "--out", tmp_path / "o", "--json", "--quiet", *quickly).out)
     assert played == json.loads((tmp_path / "o" / "report.json").read_text(encoding="utf-8"))
     alike = gramoscope("compare", heard / "flat.wav", heard / "equalised.wav", "--band", 900, 9000, "--json")
     assert json.loads(alike.out)["waveform_r"] == pytest.approx(1), "a flat record: nothing to undo"
