@@ -1,0 +1,104 @@
+"""Windows that follow a path: what they show, and how it changes when the path is moved."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import map_coordinates
+
+from gramoscope.pickup.texture.following import across, follow, interpolation_taps
+
+HALF_PX = 9
+WAVES = np.random.default_rng(4).uniform((0.03, 0.01, -3), (0.22, 0.2, 3), (12, 3))
+"""Cycles a row, cycles a column, phase."""
+
+
+def _value(column: np.ndarray, row: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A smooth picture anywhere, and its derivative with the row."""
+    angle = 2 * np.pi * (WAVES[:, 0] * row[..., None] + WAVES[:, 1] * column[..., None]) + WAVES[:, 2]
+    return np.cos(angle).sum(axis=-1), (-2 * np.pi * WAVES[:, 0] * np.sin(angle)).sum(axis=-1)
+
+
+@pytest.fixture
+def picture() -> np.ndarray:
+    column, row = np.mgrid[:150, :130]
+    return _value(column, row)[0].astype(np.float32)
+
+
+@pytest.fixture
+def path() -> np.ndarray:
+    """A slope of a third of a row a column, and a wobble."""
+    column = np.arange(150)
+    return 37.3 + 0.33 * column + 2.6 * np.sin(0.11 * column + 0.4)
+
+
+def _places(path: np.ndarray, half_px: int = HALF_PX) -> tuple[np.ndarray, np.ndarray]:
+    row = path + np.arange(-half_px, half_px + 1)[:, None]
+    return np.broadcast_to(np.arange(path.size), row.shape), row
+
+
+def test_a_window_shows_the_picture_along_a_sloping_path_and_how_it_changes(
+    picture: np.ndarray, path: np.ndarray
+) -> None:
+    window, derivative = follow(picture, path, HALF_PX)
+    value, slope = _value(*_places(path))
+    assert window.shape == derivative.shape == (2 * HALF_PX + 1, 150)
+    # places are known to a thousandth of a row
+    np.testing.assert_allclose(window, value, atol=0.005 * np.std(slope))
+    np.testing.assert_allclose(derivative, slope, atol=0.05 * np.std(slope))
+
+
+def test_between_rows_it_agrees_with_a_spline(picture: np.ndarray, path: np.ndarray) -> None:
+    window, _ = follow(picture, path, HALF_PX)
+    spline = map_coordinates(picture.astype(np.float64), _places(path), order=5)
+    assert np.std(window - spline) < 0.005 * np.std(spline)
+
+
+def test_the_derivative_is_what_happens_when_the_path_is_moved(picture: np.ndarray, path: np.ndarray) -> None:
+    _, derivative = follow(picture, path, HALF_PX)
+    step = 1 / 8
+    higher, lower = (follow(picture, path + side * step, HALF_PX)[0] for side in (1, -1))
+    moved = (higher - lower) / (2 * step)
+    assert np.std(moved - derivative) < 0.02 * np.std(derivative)
+
+
+def test_a_window_on_whole_rows_is_the_picture_itself(picture: np.ndarray) -> None:
+    path = np.round(np.linspace(40, 71, 150))
+    window, _ = follow(picture, path, HALF_PX)
+    column, row = _places(path)
+    np.testing.assert_allclose(window, picture[column, row.astype(int)], atol=1e-5)
+
+
+@pytest.mark.parametrize("row", [-60.3, -3.7, 2.2, 127.6, 188.0])
+def test_beyond_the_picture_its_outermost_row_is_repeated(picture: np.ndarray, row: float) -> None:
+    window, _ = follow(picture, np.full(150, row), HALF_PX)
+    beyond = np.pad(picture, ((0, 0), (100, 100)), mode="edge")
+    inside, _ = follow(beyond, np.full(150, row + 100), HALF_PX)
+    np.testing.assert_allclose(window, inside, atol=1e-5)
+
+
+def test_the_picture_stays_as_it_was(picture: np.ndarray, path: np.ndarray) -> None:
+    before = picture.copy()
+    picture.flags.writeable = path.flags.writeable = False
+    follow(picture, path, HALF_PX)
+    np.testing.assert_array_equal(picture, before)
+
+
+@pytest.mark.parametrize("degree", range(7))
+def test_across_is_exact_for_polynomials_up_to_the_sixth_degree(degree: int) -> None:
+    row = np.linspace(-1.2, 0.9, 16)
+    derivative = across(np.stack([row**degree, -3 * row**degree], axis=1).astype(np.float32))
+    exact = degree * row[3:-3] ** max(degree - 1, 0) * (row[1] - row[0])
+    np.testing.assert_allclose(derivative, np.stack([exact, -3 * exact], axis=1), atol=3e-6)
+
+
+def test_across_is_not_exact_for_the_seventh() -> None:
+    row = np.arange(16.0)
+    derivative = across(((row - 7) ** 7)[:, None].astype(np.float32))[:, 0]
+    assert np.abs(derivative - 7 * (row[3:-3] - 7) ** 6).max() > 1
+
+
+def test_the_weights_of_the_rows_add_up_to_one_and_mirror_each_other() -> None:
+    taps = interpolation_taps(np.array([0.0, 0.3, 0.5, 0.7, 1.0]))
+    np.testing.assert_allclose(taps.sum(axis=1), 1, atol=1e-6)
+    np.testing.assert_allclose(taps[0], np.arange(10) == 4, atol=1e-6)
+    np.testing.assert_allclose(taps[-1], np.arange(10) == 5, atol=1e-6)
+    np.testing.assert_allclose(taps[1], taps[3, ::-1], atol=1e-6)
