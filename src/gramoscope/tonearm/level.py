@@ -96,11 +96,12 @@ def bend_power(one: OneDirection, step_m: float) -> float:
     lag = max(int(np.rint(BEND_M / step_m)), 1)
     place, variance = one.place_m, one.variance
     bends = place[2 * lag :] - 2 * place[lag:-lag] + place[: -2 * lag]
-    seen = np.isfinite(bends)
+    noise = variance[2 * lag :] + 4 * variance[lag:-lag] + variance[: -2 * lag]
+    seen = np.isfinite(bends) & np.isfinite(noise)
     if np.count_nonzero(seen) < LEAST_SAMPLES:
         return float("nan")
-    noise = np.median((variance[2 * lag :] + 4 * variance[lag:-lag] + variance[: -2 * lag])[seen])
-    return float(((NORMAL * np.median(np.abs(bends[seen]))) ** 2 - noise) / (lag * step_m) ** 2)
+    power = (NORMAL * np.median(np.abs(bends[seen]))) ** 2 - np.median(noise[seen])
+    return float(power / (lag * step_m) ** 2)
 
 
 def levels(powers: Iterable[FloatArray]) -> Iterator[FloatArray]:
