@@ -17,7 +17,7 @@ from scipy import ndimage
 
 from gramoscope.apparatus.bench import Bench
 from gramoscope.camera.exposure import Exposure
-from gramoscope.conventions import INNER, FloatArray, IntArray
+from gramoscope.conventions import INNER, OUTER, FloatArray, IntArray
 from gramoscope.errors import require
 from gramoscope.pickup.cartridge import Line, Sketch, Spread
 from gramoscope.pickup.registration import Canvas, frame_shifts, register
@@ -212,12 +212,11 @@ class TexturePickup:
         if found is None:
             found = self.cartridge.search.find(sharpness(columns), self.layout, cut=cut)
         x = np.arange(columns.shape[0])
-        cell = (np.arange(found[0].shape[1]) + 0.5) * CELL_PX - 0.5
-        path, support = (
-            np.array([np.interp(x, cell, ndimage.gaussian_filter1d(wall, 1.5, mode="nearest")) for wall in both])
-            for both in found
-        )
-        return Stretch(columns, usable, burnt, settled(path, support, cut, self.cartridge.rules), support)
+        cell: FloatArray = (np.arange(found[0].shape[1], dtype=np.float64) + 0.5) * CELL_PX - 0.5
+        path = _by_column(found[0], x, cell, smooth_cells=1.5)
+        support = _by_column(found[1], x, cell, smooth_cells=SUPPORT_CELLS)
+        walls = np.array([support[self.layout.wall == wall].max(axis=0, initial=0.0) for wall in (INNER, OUTER)])
+        return Stretch(columns, usable, burnt, settled(path, walls, cut, self.cartridge.rules), support)
 
     def _read(self, canvas: Canvas, group: FrameGroup) -> tuple[Stretch, Evidence]:
         fold = self.fold.get(group.number)
@@ -282,6 +281,13 @@ class TexturePickup:
         )
 
 
+def _by_column(cells: FloatArray, x: IntArray, cell: FloatArray, *, smooth_cells: float) -> FloatArray:
+    smooth = ndimage.gaussian_filter1d(cells, smooth_cells, axis=1, mode="nearest")
+    return np.array([np.interp(x, cell, one) for one in smooth])
+
+
+SUPPORT_CELLS = 4.0
+"""Smoothing of the support: one cell of texture is a poor witness."""
 UNSEEN = Quality.NO_STRIPE | Quality.INTERPOLATED
 UNTAUGHT = "too little of the stripes is seen to learn their texture; the recipe seed-paper reads single groups"
 

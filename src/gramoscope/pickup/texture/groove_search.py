@@ -110,8 +110,8 @@ class GrooveSearch:
         -------
         displacement_px : float64 array, shape (2, cell)
             Of each wall.
-        support : float64 array, shape (2, cell)
-            Sharpness of the ridges found for each wall, the sharpest of them; 0 where none can be seen.
+        support : float64 array, shape (stripe, cell)
+            Sharpness of the ridge found for each stripe; 0 where it cannot be seen.
         """
         ridge = ridges(sharp)
         lateral, vertical = self._common(ridge, layout, cut)
@@ -147,23 +147,28 @@ class GrooveSearch:
 
     def _own_paths(self, ridge: FloatArray, layout: StripeLayout, common: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Let each wall look for its stripes, row by row, near the common path."""
-        path, support = common.copy(), np.zeros_like(common)
+        path = common.copy()
         aside = np.arange(-int(self.wall_reach_px), int(self.wall_reach_px) + 1)
-        cells = np.arange(len(ridge))
         for wall in (INNER, OUTER):
-            mine = layout.of_wall(wall)
-            score = np.zeros((len(ridge), aside.size))
-            for rest, low, high in zip(mine.rest_row, mine.first_row, mine.last_row, strict=True):
-                rows = np.round(rest + common[wall][:, None] + aside).astype(np.int64)
-                seen = (rows >= low) & (rows <= high)
-                found = np.where(seen, ridge[cells[:, None], np.clip(rows, 0, ridge.shape[1] - 1)], 0.0)
-                score += found
-                support[wall] = np.maximum(support[wall], found.max(axis=1))
+            found = _ridges_at(ridge, layout.of_wall(wall), common[wall][:, None] + aside)
             pull = -0.3 * self.step_cost * aside.astype(np.float64) ** 2
             steps, costs = np.array([3, 0]), np.array([self.step_cost, 0.0])
-            own, _ = best_path((score + pull)[:, :, None], steps, costs)
+            own, _ = best_path((found.sum(axis=0) + pull)[:, :, None], steps, costs)
             path[wall] += aside[own[0]]
+        near = np.arange(-2, 3)
+        support = np.zeros((layout.wall.size, len(ridge)))
+        for wall in (INNER, OUTER):
+            mine = layout.wall == wall
+            support[mine] = _ridges_at(ridge, layout.of_wall(wall), path[wall][:, None] + near).max(axis=2)
         return path, support
+
+
+def _ridges_at(ridge: FloatArray, layout: StripeLayout, displacement_px: FloatArray) -> FloatArray:
+    """Return the ridges, shape (stripe, cell, place), at displacements of shape (cell, place); 0 out of sight."""
+    rows = np.round(layout.rest_row[:, None, None] + displacement_px).astype(np.int64)
+    seen = (rows >= layout.first_row[:, None, None]) & (rows <= layout.last_row[:, None, None])
+    values = ridge[np.arange(len(ridge))[:, None], np.clip(rows, 0, ridge.shape[1] - 1)]
+    return np.where(seen, values, 0.0)
 
 
 GRID_PX = 3

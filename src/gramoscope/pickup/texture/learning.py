@@ -108,7 +108,7 @@ class Learning:
         band = Band(self.band_low, self.band_high)
         width = max(stretch.columns.shape[0] for stretch in stretches)
         length = fft.next_fast_len(width + self.largest_lag_px, real=True)
-        whitener = self._whitener(stretches, layout, band, spread)
+        whitener = self._whitener(stretches, layout, band, rules, spread)
         blank = Model(layout, whitener, self.half_px, band, length, ())
         fold = np.arange(len(stretches)) % self.folds
         lessons: list[Lesson] = []
@@ -132,20 +132,22 @@ class Learning:
 
         return list(spread(moved, zip(stretches, fold, strict=True)))
 
-    def _whitener(self, stretches: list[Stretch], layout: StripeLayout, band: Band, spread: Spread) -> FloatArray:
-        powers = [power for power in spread(lambda s: self._power(s, layout), stretches) if power is not None]
+    def _whitener(
+        self, stretches: list[Stretch], layout: StripeLayout, band: Band, rules: Rules, spread: Spread
+    ) -> FloatArray:
+        powers = [power for power in spread(lambda s: self._power(s, layout, rules), stretches) if power is not None]
         if not powers:
             return whitening_filter(np.ones(129), band)
         return whitening_filter(np.mean(powers, axis=0), band)
 
-    def _power(self, stretch: Stretch, layout: StripeLayout) -> FloatArray | None:
+    def _power(self, stretch: Stretch, layout: StripeLayout, rules: Rules) -> FloatArray | None:
         """Mean power spectrum of the rows of all stripes in pieces of 256 columns."""
         rows = layout.rows(stretch.displacement_px)
         visible = layout.visible(rows, half_px=self.half_px)
         taper = np.hanning(256)
         spectra = []
-        for row, seen in zip(rows, visible, strict=True):
-            clear = clear_columns(stretch, row, seen, self.half_px)
+        for number, row in enumerate(rows):
+            clear = clear_columns(stretch, number, row, visible[number], self.half_px, rules)
             if not clear.any():
                 continue
             window, _ = windows(stretch, row, np.ones(1), self.half_px)
@@ -231,7 +233,7 @@ class Learning:
         """Return window, derivative and weight of a stripe; None where too little of it can be seen."""
         row = model.layout.rows(stretch.displacement_px)[number]
         seen = model.layout.visible(model.layout.rows(stretch.displacement_px), half_px=self.half_px)[number]
-        clear = clear_columns(stretch, row, seen, self.half_px)
+        clear = clear_columns(stretch, number, row, seen, self.half_px, rules)
         if not clear.any():
             return None
         window, derivative = windows(stretch, row, model.whitener, self.half_px)

@@ -39,8 +39,8 @@ class Stretch:
         Places at full scale.
     displacement_px : float64 array, shape (2, column)
         The present path of each wall.
-    support : float64 array, shape (2, column)
-        Of the coarse search.
+    support : float64 array, shape (stripe, column)
+        How sharp the coarse search found each stripe.
     """
 
     columns: Float32Array
@@ -105,6 +105,8 @@ class Rules:
     ----------
     power_limits : (float, float)
         Columns with less or more texture than so many times the usual are damaged.
+    least_support : float
+        Sharpness, of a typical sharp row, below which a stripe is not there.
     smooth_px : float
         Least standard deviation of the smoothing of steps in the direction of the cut.
     step_noise_px : float
@@ -117,6 +119,7 @@ class Rules:
     """
 
     power_limits: tuple[float, float] = (0.2, 4.0)
+    least_support: float = 0.15
     smooth_px: float = 12.0
     step_noise_px: float = 0.08
     smooth_other_px: float = 200.0
@@ -131,12 +134,14 @@ def windows(
     return filtered(window, whitener), filtered(derivative, whitener)
 
 
-def clear_columns(stretch: Stretch, stripe_row: FloatArray, visible: BoolArray, half_px: int) -> BoolArray:
-    """Tell in which columns a stripe can be seen whole, by enough frames and without burnt places."""
+def clear_columns(
+    stretch: Stretch, number: int, stripe_row: FloatArray, visible: BoolArray, half_px: int, rules: Rules
+) -> BoolArray:
+    """Tell in which columns a stripe is there and can be seen whole, by enough frames and without burnt places."""
     height = stretch.columns.shape[1]
     rows = np.clip(np.round(stripe_row)[:, None].astype(np.int64) + np.arange(-half_px, half_px + 1), 0, height - 1)
     burnt = stretch.burnt[np.arange(rows.shape[0])[:, None], rows].mean(axis=1) > BURNT_SHARE
-    return np.asarray(visible & stretch.usable & ~burnt)
+    return np.asarray(visible & stretch.usable & ~burnt & (stretch.support[number] >= rules.least_support))
 
 
 def evidence(stretch: Stretch, model: Model, rules: Rules) -> Evidence:
@@ -145,10 +150,11 @@ def evidence(stretch: Stretch, model: Model, rules: Rules) -> Evidence:
     score, information, surprise = np.zeros((2, width)), np.zeros((2, width)), np.zeros((2, 2))
     rows = model.layout.rows(stretch.displacement_px)
     visible = model.layout.visible(rows, half_px=model.half_px)
-    for row, seen, wall, statistics in zip(rows, visible, model.layout.wall, model.stripes, strict=True):
+    for number, statistics in enumerate(model.stripes):
         if statistics is None:
             continue
-        clear = clear_columns(stretch, row, seen, model.half_px)
+        row, wall = rows[number], model.layout.wall[number]
+        clear = clear_columns(stretch, number, row, visible[number], model.half_px, rules)
         if not clear.any():
             continue
         window, derivative = windows(stretch, row, model.whitener, model.half_px)
@@ -191,7 +197,7 @@ def settled(displacement_px: FloatArray, support: FloatArray, cut: Cut, rules: R
     Parameters
     ----------
     displacement_px, support : float64 arrays, shape (2, column)
-        From the coarse search; the wall with the better support counts for more.
+        From the coarse search, and how sharp each wall was found; the wall with the better support counts for more.
     """
     if cut == "stereo":
         return displacement_px
