@@ -17,7 +17,7 @@ def play(
     /,
     *,
     out: Path,
-    recipe: str = "seed-paper",
+    recipe: str = "best",
     rate: int = 96_000,
     characteristic: str | None = None,
     workers: Workers = PROCESSORS,
