@@ -196,7 +196,8 @@ class TexturePickup:
         for number, wall in enumerate(layout.wall):
             measured = visible[number] & (found.information[wall] > 0)
             if model.stripes[number] is not None:
-                name = f"{'inner' if wall == INNER else 'outer'} wall"
+                lowest = layout.from_bottom_px[number] == layout.from_bottom_px[layout.wall == wall].min()
+                name = f"{'inner' if wall == INNER else 'outer'} wall, {'lower' if lowest else 'upper'} stripe"
                 lines.append(Line(name, rows[number, : image.shape[1]], measured[: image.shape[1]]))
         return Sketch(image, tuple(lines))
 
