@@ -1,0 +1,167 @@
+"""What passages teach: paths get better, error bars are true, and nobody marks his own work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gramoscope.conventions import FloatArray
+from gramoscope.errors import ArgumentError
+from gramoscope.pickup.texture.layout import StripeLayout
+from gramoscope.pickup.texture.learning import Learning, Lesson
+from gramoscope.pickup.texture.reading import Evidence, Model, Rules, Stretch, read
+
+SHORT = Learning(half_px=9, largest_lag_px=60, loading=(0.03, 0.01, 0.003), least_columns=3000, folds=3)
+RULES = Rules()
+AWAY_FROM_ENDS = slice(60, -60)
+
+
+def _learned(stretches: list[Stretch], layout: StripeLayout, spread: Any = map, **changed: Any) -> tuple[Lesson, ...]:
+    return replace(SHORT, **changed).learn(stretches, layout, "lateral", RULES, spread)
+
+
+@pytest.fixture(scope="module")
+def lessons(stretches: list[Stretch], layout: StripeLayout) -> tuple[Lesson, ...]:
+    return _learned(stretches, layout)
+
+
+def _read(stretch: Stretch, lessons: tuple[Lesson, ...], fold: int) -> tuple[Stretch, Evidence]:
+    return read(stretch, [lesson.without[fold] for lesson in lessons], "lateral", RULES)
+
+
+def _common(error: FloatArray) -> FloatArray:
+    return error.mean(axis=0)[AWAY_FROM_ENDS]
+
+
+def test_paths_get_better_by_what_the_other_stretches_taught(
+    stretches: list[Stretch], lessons: tuple[Lesson, ...], true_px: Callable[[int], FloatArray]
+) -> None:
+    before, after = [], []
+    for number, stretch in enumerate(stretches):
+        read_, _ = _read(stretch, lessons, number % 3)
+        before.append(_common(stretch.displacement_px - true_px(number)))
+        after.append(_common(read_.displacement_px - true_px(number)))
+    # the passage cannot know where the stripes lie at rest: a constant of all stretches is left
+    assert np.std(before) > 0.4
+    assert np.std(after) < 0.3 * np.std(before)
+
+
+def test_a_stretch_that_nobody_learned_from_is_read_as_well(
+    another: Stretch, lessons: tuple[Lesson, ...], true_px: Callable[[int], FloatArray]
+) -> None:
+    read_, found = read(another, [lesson.whole for lesson in lessons], "lateral", RULES)
+    assert np.std(_common(read_.displacement_px - true_px(77))) < 0.3 * np.std(
+        _common(another.displacement_px - true_px(77))
+    )
+    assert (found.information[:, AWAY_FROM_ENDS] > 0).all()
+    np.testing.assert_allclose(found.surprise, 1.0, atol=0.6)
+
+
+def _same(one: Model, other: Model) -> bool:
+    if not np.array_equal(one.whitener, other.whitener):
+        return False
+    pairs = zip(one.stripes, other.stripes, strict=True)
+    return all(
+        a is not None
+        and b is not None
+        and np.array_equal(a.inverse, b.inverse)
+        and (a.information, a.score_power, a.mean_score) == (b.information, b.score_power, b.mean_score)
+        for a, b in pairs
+    )
+
+
+def _scattered(pool: ThreadPoolExecutor) -> Callable[..., Iterator[Any]]:
+    """A map whose tasks begin in the wrong order."""
+
+    def spread(work: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterator[Any]:
+        listed = list(tasks)
+        futures = {i: pool.submit(work, listed[i]) for i in reversed(range(len(listed)))}
+        return iter([futures[i].result() for i in range(len(listed))])
+
+    return spread
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_learning_again_with_any_number_of_threads_gives_the_same_bits(
+    stretches: list[Stretch], layout: StripeLayout, lessons: tuple[Lesson, ...], threads: int
+) -> None:
+    with ThreadPoolExecutor(threads) as pool:
+        again = _learned(stretches, layout, _scattered(pool))
+    for one, other in zip(lessons, again, strict=True):
+        assert _same(one.whole, other.whole)
+        assert all(_same(a, b) for a, b in zip(one.without, other.without, strict=True))
+
+
+def test_no_stretch_is_read_by_spectra_that_it_helped_to_make(stretches: list[Stretch], layout: StripeLayout) -> None:
+    spoilt = list(stretches)
+    spectrum = np.fft.rfft(spoilt[4].columns, axis=0)
+    phase = np.random.default_rng(1).uniform(0, 2 * np.pi, spectrum.shape)
+    # every row as loud as it was at each frequency, but its neighbours know nothing of it
+    torn = np.fft.irfft(
+        np.abs(spectrum) * np.exp(1j * np.where(spectrum.imag == 0, 0, phase)), len(spoilt[4].columns), axis=0
+    )
+    spoilt[4] = replace(spoilt[4], columns=torn.astype(np.float32))
+    one, other = (_learned(which, layout, loading=(0.03,))[0] for which in (stretches, spoilt))
+    # the one filter that makes all windows white is the whole passage's
+    for k in range(3):
+        apart = [
+            np.abs(a.inverse - b.inverse).max() / np.abs(a.inverse).max()
+            for a, b in zip(one.without[k].stripes, other.without[k].stripes, strict=True)
+            if a is not None and b is not None
+        ]
+        assert len(apart) == 2
+        if k == 4 % 3:
+            assert max(apart) < 0.1
+        else:
+            assert min(apart) > 0.4
+    assert not _same(one.whole, other.whole)
+
+
+def test_the_inputs_stay_as_they_were(stretches: list[Stretch], layout: StripeLayout) -> None:
+    names = ("columns", "usable", "burnt", "displacement_px", "support")
+    before = {name: getattr(stretches[0], name).copy() for name in names}
+    _learned(stretches[:6], layout, loading=(0.03,), least_columns=1000)
+    for name in names:
+        np.testing.assert_array_equal(getattr(stretches[0], name), before[name])
+
+
+def test_a_stripe_seen_too_little_is_not_read(stretches: list[Stretch], layout: StripeLayout) -> None:
+    seldom = []
+    for number, stretch in enumerate(stretches):
+        support = stretch.support.copy()
+        support[1] *= number % 4 == 0
+        seldom.append(replace(stretch, support=support))
+    lesson = _learned(seldom, layout, loading=(0.03,))[-1]
+    assert lesson.whole.stripes[0] is not None
+    assert lesson.whole.stripes[1] is None
+    assert all(model.stripes[1] is None for model in lesson.without), "nor by those that did not miss it"
+
+
+def test_two_groups_teach_nothing_and_say_so(stretches: list[Stretch], layout: StripeLayout) -> None:
+    for lesson in _learned(stretches[:2], layout):
+        assert lesson.whole.stripes == (None, None)
+
+
+def test_after_each_round_somebody_is_told(stretches: list[Stretch], layout: StripeLayout) -> None:
+    told: list[int] = []
+    SHORT.learn(stretches[:4], layout, "lateral", RULES, map, lambda: told.append(1))
+    assert len(told) == len(SHORT.loading)
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"half_px": 3}, "3 rows"),
+        ({"folds": 1}, "1 folds"),
+        ({"loading": ()}, "no rounds"),
+        ({"band_low": 0.4, "band_high": 0.3}, "a band"),
+    ],
+)
+def test_impossible_settings_are_refused(changed: dict[str, Any], said: str) -> None:
+    with pytest.raises(ArgumentError, match=said):
+        Learning(**changed)

@@ -1,0 +1,172 @@
+"""How scores become steps: both walls together, one wall alone, and what the cut does not use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gramoscope.conventions import INNER, OUTER, FloatArray
+from gramoscope.disc.formats import Cut
+from gramoscope.pickup.texture.layout import StripeLayout
+from gramoscope.pickup.texture.learning import Learning
+from gramoscope.pickup.texture.reading import Evidence, Rules, Stretch, clear_columns, evidence, read, settled, step
+
+WIDTH = 800
+RULES = Rules()
+COLUMN = np.arange(WIDTH)
+
+
+def _evidence(missing_px: FloatArray, information: FloatArray | float = 2.0) -> Evidence:
+    """Walls that lie by so much beside their paths, and say so without noise."""
+    i = np.broadcast_to(np.asarray(information, np.float64), missing_px.shape).copy()
+    return Evidence(missing_px * i, i, np.ones(2))
+
+
+def _walls(inner_px: float, outer_px: float) -> FloatArray:
+    return np.tile([[inner_px], [outer_px]], WIDTH)
+
+
+@pytest.mark.parametrize(
+    ("cut", "missing"),
+    [("lateral", (0.3, 0.3)), ("vertical", (-0.3, 0.3)), ("stereo", (0.3, -0.1)), ("stereo", (0.0, 0.4))],
+)
+def test_what_is_missing_is_what_the_path_is_moved_by(cut: Cut, missing: tuple[float, float]) -> None:
+    np.testing.assert_allclose(step(_evidence(_walls(*missing)), cut, RULES), _walls(*missing), atol=1e-12)
+
+
+@pytest.mark.parametrize(("cut", "sign"), [("lateral", 1.0), ("vertical", -1.0)])
+def test_a_silent_wall_goes_along_with_the_other(cut: Cut, sign: float) -> None:
+    information = np.full((2, WIDTH), 2.0)
+    information[INNER, 300:500] = 0
+    swing = 0.3 * np.sin(2 * np.pi * COLUMN / 300)
+    moved = step(_evidence(np.array([sign * swing, swing]), information), cut, RULES)
+    np.testing.assert_allclose(moved[INNER], sign * moved[OUTER], atol=1e-12)
+    assert np.abs(moved[OUTER] - swing)[50:-50].max() < 0.05
+
+
+def test_a_silent_wall_of_a_stereo_cut_stays_where_it_is() -> None:
+    information = np.full((2, WIDTH), 2.0)
+    information[INNER] = 0
+    moved = step(_evidence(_walls(0.4, 0.2), information), "stereo", RULES)
+    assert (moved[INNER] == 0).all()
+    np.testing.assert_allclose(moved[OUTER], 0.2)
+
+
+def test_nothing_seen_moves_nothing() -> None:
+    for cut in ("lateral", "vertical", "stereo"):
+        assert (step(_evidence(_walls(0.4, 0.2), 0.0), cut, RULES) == 0).all()
+
+
+@pytest.mark.parametrize(("cut", "sign"), [("lateral", 1.0), ("vertical", -1.0)])
+def test_what_the_cut_does_not_use_follows_slowly(cut: Cut, sign: float) -> None:
+    fast, slow = np.sin(2 * np.pi * COLUMN / 150), np.full(WIDTH, 0.5)
+    # walls that move as the cut does not let them
+    against = np.array([-sign * fast, fast])
+    assert np.abs(step(_evidence(0.5 * against), cut, RULES))[:, 200:-200].max() < 0.1
+    steady = step(_evidence(np.array([-sign * slow, slow])), cut, RULES)
+    np.testing.assert_allclose(steady[OUTER], 0.5, atol=0.01)
+    np.testing.assert_allclose(steady[INNER], -sign * 0.5, atol=0.01)
+
+
+def test_a_wall_that_knows_more_has_more_to_say() -> None:
+    information = np.array([np.full(WIDTH, 3.0), np.full(WIDTH, 1.0)])
+    fast = 0.4 * np.sin(2 * np.pi * COLUMN / 150)
+    moved = step(_evidence(np.array([fast, 0 * fast]), information), "lateral", RULES)
+    middle = slice(200, -200)
+    assert (moved.mean(axis=0) * fast)[middle].sum() / (fast**2)[middle].sum() == pytest.approx(0.75, abs=0.1)
+
+
+def test_no_step_is_larger_than_the_rules_allow() -> None:
+    moved = step(_evidence(_walls(9.0, 9.0)), "lateral", RULES)
+    assert np.abs(moved).max() <= 2 * RULES.largest_step_px
+    assert step(_evidence(_walls(9.0, 9.0)), "stereo", RULES).max() == RULES.largest_step_px
+
+
+def test_steps_are_as_quiet_as_the_rules_allow_and_not_quieter_than_sound_needs() -> None:
+    rng = np.random.default_rng(4)
+    information = 0.5
+
+    def noise_px(rules: Rules) -> float:
+        score = np.sqrt(information) * rng.normal(size=(40, 2, WIDTH))
+        steps = [step(Evidence(one, np.full((2, WIDTH), information), np.ones(2)), "stereo", rules) for one in score]
+        return float(np.std(np.array(steps)[:, :, 100:-100]))
+
+    assert noise_px(Rules(smooth_px=20.0, step_noise_px=0.18)) == pytest.approx(0.18, rel=0.15)
+    least = 1 / np.sqrt(2 * np.sqrt(np.pi) * 20 * information)
+    assert noise_px(Rules(smooth_px=20.0, step_noise_px=5.0)) == pytest.approx(least, rel=0.15)
+
+
+JITTER = np.random.default_rng(8).normal(size=(2, WIDTH))
+
+
+@pytest.mark.parametrize(("cut", "sign"), [("lateral", 1.0), ("vertical", -1.0)])
+def test_settled_paths_swing_together_and_keep_their_distance(cut: Cut, sign: float) -> None:
+    swing = 12 * np.sin(2 * np.pi * COLUMN / 400 + 0.4)
+    path = np.array([sign * swing + sign * -1.5, swing + 1.5])
+    found = settled(path + JITTER, np.ones((2, WIDTH)), cut, RULES)
+    # what one wall has alone is smoothed away; what is common is left for the exact reading
+    apart = sign * found[INNER] - found[OUTER]
+    assert np.std(apart) < 0.35 * np.std(JITTER[INNER] - JITTER[OUTER])
+    assert apart.mean() == pytest.approx(-3.0, abs=0.6)
+    np.testing.assert_allclose(settled(path, np.ones((2, WIDTH)), cut, RULES), path, atol=0.02)
+
+
+def test_a_wall_without_support_takes_the_path_of_the_other() -> None:
+    swing = 12 * np.sin(2 * np.pi * COLUMN / 400 + 0.4)
+    support = np.ones((2, WIDTH))
+    support[INNER, 300:500] = 0.0
+    path = np.array([swing, swing])
+    path[INNER, 300:500] += 7.0
+    found = settled(path, support, "lateral", RULES)
+    assert np.abs(found - swing).max() < 0.1
+
+
+def test_walls_of_a_stereo_cut_are_left_alone() -> None:
+    path = JITTER.copy()
+    np.testing.assert_array_equal(settled(path, np.ones((2, WIDTH)), "stereo", RULES), path)
+
+
+def _clear(stretch: Stretch, **changed: object) -> np.ndarray:
+    row, seen = np.full(900, 29.3), np.ones(900, bool)
+    return clear_columns(replace(stretch, **changed), 0, row, seen, 9, RULES)
+
+
+def test_columns_that_are_burnt_thin_or_without_stripe_are_not_clear(another: Stretch) -> None:
+    assert _clear(another).all()
+    burnt, usable, support = another.burnt.copy(), another.usable.copy(), another.support.copy()
+    burnt[100:110, 25:33] = True
+    burnt[200:210, 25:26] = True
+    burnt[300:310, 60:] = True
+    (
+        np.testing.assert_array_equal(np.flatnonzero(~_clear(another, burnt=burnt)), np.arange(100, 110)),
+        "one grain is none",
+    )
+    usable[:40] = False
+    np.testing.assert_array_equal(np.flatnonzero(~_clear(another, usable=usable)), np.arange(40))
+    support[0, 500:] = 0.5 * RULES.least_support
+    support[1] = 0
+    np.testing.assert_array_equal(np.flatnonzero(~_clear(another, support=support)), np.arange(500, 900))
+
+
+def test_a_damaged_place_says_nothing_and_spoils_nothing(
+    stretches: list[Stretch], another: Stretch, layout: StripeLayout, true_px: Callable[[int], FloatArray]
+) -> None:
+    learning = Learning(half_px=9, largest_lag_px=60, loading=(0.03, 0.01), least_columns=3000, folds=3)
+    models = [lesson.whole for lesson in learning.learn(stretches, layout, "lateral", RULES, map)]
+    columns = another.columns.copy()
+    columns[400:480] = 100.0  # neither wall
+    columns[600:606, 60:] += 300.0  # a scratch over the inner wall
+    path, found = read(replace(another, columns=columns), models, "lateral", RULES)
+    assert (found.information[:, 425:455] == 0).all()
+    assert (found.score[:, 425:455] == 0).all()
+    assert (found.information[INNER, 596:610] < 1e-6).all()
+    assert (found.information[OUTER, 596:610] > 0).all()
+    whole, _ = read(another, models, "lateral", RULES)
+    far = np.r_[60:330, 700:840]
+    assert np.std((path.displacement_px - whole.displacement_px).mean(axis=0)[far]) < 0.1
+    # the bridge is as wrong as the start was, no worse
+    assert np.abs(path.displacement_px - true_px(77)).max() < np.abs(another.displacement_px - true_px(77)).max() + 0.7
+    assert np.isfinite(evidence(path, models[-1], RULES).score).all()
