@@ -1,0 +1,143 @@
+"""The cartridge around the likelihood: what it learns from, what its samples weigh, what it says when it knows nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gramoscope.apparatus.bench import Bench, Sequence
+from gramoscope.errors import ArgumentError
+from gramoscope.pickup.texture.reading import Evidence, Stretch
+from gramoscope.pickup.texture_likelihood import STRIDE_PX, TextureLikelihood, samples_of
+from gramoscope.quality import Quality
+from gramoscope.signal_path import FrameGroup
+from gramoscope.simulation.scene import filming_bench
+
+WIDTH = 203
+
+
+def _stretch(displacement_px: np.ndarray) -> Stretch:
+    nothing = np.zeros((WIDTH, 5), np.float32)
+    return Stretch(nothing, np.ones(WIDTH, bool), nothing > 0, displacement_px, np.ones((4, WIDTH)))
+
+
+def _evidence(rng: np.random.Generator, information: np.ndarray) -> Evidence:
+    return Evidence(np.sqrt(information) * rng.normal(size=information.shape), information, np.ones(2))
+
+
+def test_a_sample_is_the_mean_of_its_columns_weighted_by_what_each_knows() -> None:
+    rng = np.random.default_rng(2)
+    path, information = rng.normal(5, 1, (2, WIDTH)), rng.uniform(0.5, 3, (2, WIDTH))
+    found = _evidence(rng, information)
+    place, sigma = samples_of(_stretch(path), found)
+    assert place.shape == sigma.shape == (2, WIDTH // STRIDE_PX)
+    each = path + found.score / information
+    for sample in (0, 11, 24):
+        mine = slice(sample * STRIDE_PX, (sample + 1) * STRIDE_PX)
+        for wall in (0, 1):
+            weight = information[wall, mine]
+            assert place[wall, sample] == pytest.approx(np.average(each[wall, mine], weights=weight))
+            assert sigma[wall, sample] == pytest.approx(1 / np.sqrt(weight.sum()))
+
+
+def test_error_bars_are_true_when_scores_are() -> None:
+    rng = np.random.default_rng(3)
+    information = rng.uniform(0.5, 3, (2, WIDTH))
+    z = []
+    for _ in range(60):
+        place, sigma = samples_of(_stretch(np.full((2, WIDTH), 4.0)), _evidence(rng, information))
+        z.append((place - 4.0) / sigma)
+    assert np.std(z) == pytest.approx(1, abs=0.04)
+
+
+def test_a_wall_that_nobody_saw_has_no_place() -> None:
+    information = np.ones((2, WIDTH))
+    information[1] = 0
+    information[0, 80:120] = 0
+    place, sigma = samples_of(_stretch(np.zeros((2, WIDTH))), _evidence(np.random.default_rng(1), information))
+    np.testing.assert_array_equal(np.isnan(place[0]), (np.arange(25) >= 10) & (np.arange(25) < 15))
+    assert np.isnan(place[1]).all()
+    np.testing.assert_array_equal(np.isnan(place), np.isnan(sigma))
+
+
+@pytest.mark.parametrize(
+    ("surprise", "factor"), [(1.0, 1.0), (4.0, 2.0), (0.8, np.sqrt(0.8)), (np.nan, 1.0), (1e3, 3.0)]
+)
+def test_a_stretch_that_surprises_has_wider_error_bars(surprise: float, factor: float) -> None:
+    usual = _evidence(np.random.default_rng(1), np.ones((2, WIDTH)))
+    stretch = _stretch(np.zeros((2, WIDTH)))
+    _, sigma = samples_of(stretch, usual)
+    _, wider = samples_of(stretch, replace(usual, surprise=np.array([1.0, surprise])))
+    np.testing.assert_array_equal(wider[0], sigma[0])
+    np.testing.assert_allclose(wider[1], factor * sigma[1])
+
+
+@pytest.mark.parametrize(("groups", "wanted"), [(1, 1), (5, 5), (64, 64), (65, 64), (6000, 64)])
+def test_it_learns_from_groups_all_over_the_passage(groups: int, wanted: int) -> None:
+    numbers = TextureLikelihood(Bench()).learning_groups(groups)
+    assert numbers.size == np.unique(numbers).size == wanted
+    assert numbers[0] == 0
+    assert numbers[-1] == groups - 1
+    assert np.diff(numbers).max(initial=1) <= np.ceil(groups / wanted) + 2
+
+
+def test_learning_from_no_group_is_refused() -> None:
+    with pytest.raises(ArgumentError, match="0 groups"):
+        TextureLikelihood(Bench(), learn_groups=0)
+
+
+def _blank(number: int, grey: float, *, valid: bool = True) -> FrameGroup:
+    images = np.random.default_rng(number).normal(grey, 3, (3, 448, 1280)).clip(0, 255).astype(np.uint8)
+    return FrameGroup(
+        number=number,
+        images=images,
+        arc_start_m=number * 470e-6 + 0.8e-6 * np.arange(3),
+        stage_m=np.zeros(3),
+        pixel_pitch_m=0.390625e-6,
+        white_level=255,
+        valid=np.full(3, valid),
+        problems=("a cable hung loose",),
+    )
+
+
+@pytest.fixture
+def cartridge() -> TextureLikelihood:
+    return TextureLikelihood(replace(filming_bench(height_px=448), sequence=Sequence(groups=3, frames_per_group=3)))
+
+
+def test_a_passage_too_short_to_learn_from_is_lost_and_says_why(cartridge: TextureLikelihood) -> None:
+    pickup = cartridge.learn(lambda n: _blank(n, 90), 3, map)
+    assert not pickup.taught
+    trace = pickup.read(_blank(1, 90))
+    assert np.isnan(trace.offset_m).all()
+    assert (trace.flags & Quality.NO_STRIPE).all()
+    assert (trace.flags & Quality.INTERPOLATED).all()
+    assert trace.problems[0] == "a cable hung loose"
+    assert "group 1 is not read: too little of the stripes is seen to learn their texture" in trace.problems[1]
+    assert pickup.sketch(_blank(1, 90)) is None
+    assert pickup.calibration["groups"] == 3
+    assert trace.arc_start_m == pytest.approx(470e-6 + 3.5 * 0.390625e-6)
+
+
+@pytest.mark.parametrize(("grey", "valid", "flag"), [(0.0, True, Quality.DARK), (90.0, False, Quality.FRAME_LOST)])
+def test_a_passage_without_a_usable_frame_is_learned_and_read_without_an_exception(
+    cartridge: TextureLikelihood, grey: float, valid: bool, flag: Quality
+) -> None:
+    pickup = cartridge.learn(lambda n: _blank(n, grey, valid=valid), 3, map)
+    trace = pickup.read(_blank(1, grey, valid=valid))
+    assert (trace.flags & flag).all()
+    assert np.isnan(trace.offset_m).all()
+    assert trace.problems[0] == "a cable hung loose"
+    assert "too little" not in " ".join(trace.problems)
+    assert pickup.sketch(_blank(1, grey, valid=valid)) is None
+
+
+def test_what_has_been_learned_is_told_to_the_end(cartridge: TextureLikelihood) -> None:
+    told: list[tuple[int, int]] = []
+    cartridge.learn(lambda n: _blank(n, 90), 3, map, lambda done, total: told.append((done, total)))
+    done, totals = zip(*told, strict=True)
+    assert list(done) == sorted(done)
+    assert len(set(totals)) == 1
+    assert done[-1] == totals[0]
