@@ -67,7 +67,7 @@ def film(damaged: bool = True) -> Take:
 
 def read(take: Take, *, segments: int | None = None) -> Reading:
     """Read the group, by the paper's search or by one that cuts the picture into segments."""
-    pickup = load_recipe("seed-paper").pickup_for(take.scene.bench)
+    pickup = load_recipe("seed-paper").cartridge_for(take.scene.bench)
     search = straight_search() if segments is None else replace(pickup.hough, segments=segments)
     reading = replace(pickup, hough=search).inspect(take.groups[0])
     assert reading is not None

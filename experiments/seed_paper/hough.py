@@ -43,7 +43,7 @@ class StripeFound:
 
 def straight_search() -> HoughSearch:
     """Return the paper's own search: the whole picture at once."""
-    return replace(load_recipe("seed-paper").pickup_for(filming_bench()).hough, segments=1)
+    return replace(load_recipe("seed-paper").cartridge_for(filming_bench()).hough, segments=1)
 
 
 def sound() -> FloatArray:
@@ -94,7 +94,7 @@ def noiseless_centroid_rms_px() -> float:
     take = film(LEVEL_M_S)
     quiet = replace(take.scene, noise=SensorNoise(full_well_electrons=1e9, read_electrons=0.0))
     take = film_in_memory(sound(), NOISE_RATE_HZ, quiet, [FIRST])
-    reading = replace(load_recipe("seed-paper").pickup_for(quiet.bench), hough=straight_search()).inspect(
+    reading = replace(load_recipe("seed-paper").cartridge_for(quiet.bench), hough=straight_search()).inspect(
         take.groups[0]
     )
     assert reading is not None
@@ -140,7 +140,7 @@ def _segments_table(page: Page, pickup: SeedPaperPickup, takes: dict[str, Take])
 def make(folder: Path = FOLDER) -> Page:
     """Write the page."""
     take, search = film(LEVEL_M_S, GROUPS), straight_search()
-    pickup = load_recipe("seed-paper").pickup_for(take.scene.bench)
+    pickup = load_recipe("seed-paper").cartridge_for(take.scene.bench)
     reading = replace(pickup, hough=search).inspect(take.groups[0])
     assert reading is not None
     found = stripes_found(take, reading)

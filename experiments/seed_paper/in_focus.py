@@ -254,7 +254,7 @@ def _verdict(errors: Errors) -> str:
 def make(folder: Path = FOLDER) -> Page:
     """Write the page."""
     take = film()
-    pickup = load_recipe("seed-paper").pickup_for(take.scene.bench)
+    pickup = load_recipe("seed-paper").cartridge_for(take.scene.bench)
     reading = pickup.inspect(take.groups[0])
     assert reading is not None
     errors = flow_errors(take, pickup)

@@ -90,7 +90,7 @@ def traces(take: Take, *, neighbourhood_px: float = 100.0) -> list[WallTrace]:
     """Read all groups and put each where it really begins."""
     recipe = load_recipe("seed-paper")
     pickup = replace(
-        recipe.pickup_for(take.scene.bench), orientation=WallOrientation(neighbourhood_px=neighbourhood_px)
+        recipe.cartridge_for(take.scene.bench), orientation=WallOrientation(neighbourhood_px=neighbourhood_px)
     )
     return [trace for trace, _ in recipe.splice.join(pickup.read(group) for group in take.groups)]
 

@@ -77,7 +77,7 @@ def film() -> Take:
 
 def readings(take: Take) -> list[Reading]:
     """Read all groups of a take by the recipe of the paper."""
-    pickup = load_recipe("seed-paper").pickup_for(take.scene.bench)
+    pickup = load_recipe("seed-paper").cartridge_for(take.scene.bench)
     seen = (pickup.inspect(group) for group in take.groups)
     return [reading for reading in seen if reading is not None]
 
