@@ -36,3 +36,8 @@ class Course:
     def wall_angles_rad(self) -> FloatArray:
         """φ of the inner and of the outer wall."""
         return np.broadcast_to(np.asarray(self.wall_angle_rad, np.float64), 2)
+
+    @property
+    def gains(self) -> FloatArray:
+        """How far the inner and the outer wall move towards +l when the groove rises by one: ∓ cot φ."""
+        return np.array([-1.0, 1.0]) / np.tan(self.wall_angles_rad)

@@ -15,9 +15,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gramoscope.conventions import FloatArray
+from gramoscope.conventions import INNER, OUTER, BoolArray, FloatArray
 from gramoscope.quality import NOT_MEASURED, FlagArray
 from gramoscope.signal_path import WallTrace
+
+REACH = 3
+"""So many neighbours on each side take part in a median."""
+HAMPEL_GATE = 3.0
+"""A sample further from the median than so many times its error and the neighbours' median deviation is an outlier."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,9 +35,15 @@ class Stretch:
         Even.
     place_m, variance : float64 arrays, shape (2, sample)
         Lateral place of each wall and its variance; NaN where nothing was measured.
+    middle_m : float64 array, shape (2, sample)
+        Running median of the places.
+    suspect : bool array, shape (2, sample)
+        See `suspects`.
     share : float64 array, shape (2, sample)
         0 … 1, how much of its information each sample keeps.
     flags : uint16 array, shape (2, sample)
+    step_m : float
+        From one sample to the next.
     correlation_samples : float
         See `WallTrace`.
     """
@@ -40,8 +51,11 @@ class Stretch:
     arc_m: FloatArray
     place_m: FloatArray
     variance: FloatArray
+    middle_m: FloatArray
+    suspect: BoolArray
     share: FloatArray
     flags: FlagArray
+    step_m: float
     correlation_samples: float
 
 
@@ -49,12 +63,17 @@ def stretch_of(trace: WallTrace) -> Stretch:
     """Return the places of a trace; what was not measured is NaN, and flagged so."""
     flagged = (trace.flags & np.uint16(NOT_MEASURED)) != 0
     seen = np.isfinite(trace.offset_m) & (trace.offset_sigma_m > 0) & np.isfinite(trace.offset_sigma_m) & ~flagged
+    place, variance = np.where(seen, trace.offset_m, np.nan), np.where(seen, trace.offset_sigma_m**2, np.nan)
+    middle = running_median(place)
     return Stretch(
         arc_m=trace.arc_start_m + np.arange(trace.flags.shape[1], dtype=np.float64) * trace.arc_step_m,
-        place_m=np.where(seen, trace.offset_m, np.nan),
-        variance=np.where(seen, trace.offset_sigma_m**2, np.nan),
+        place_m=place,
+        variance=variance,
+        middle_m=middle,
+        suspect=suspects(place, variance, middle),
         share=np.ones(trace.flags.shape),
         flags=np.where(seen, trace.flags, trace.flags | np.uint16(NOT_MEASURED)).astype(np.uint16),
+        step_m=trace.arc_step_m,
         correlation_samples=trace.correlation_samples,
     )
 
@@ -79,7 +98,50 @@ def counted_from_the_start(stretches: Iterable[Stretch]) -> Iterator[Stretch]:
         for wall in np.flatnonzero(np.isnan(origin[:, 0]) & np.isfinite(stretch.place_m).any(axis=1)):
             seen = stretch.place_m[wall]
             origin[wall, 0] = seen[np.flatnonzero(np.isfinite(seen))[0]]
-        yield replace(stretch, place_m=stretch.place_m - origin)
+        yield replace(stretch, place_m=stretch.place_m - origin, middle_m=stretch.middle_m - origin)
+
+
+def running_median(place_m: FloatArray) -> FloatArray:
+    """Return the median of each sample and its `REACH` neighbours on each side, NaN left out; shape (2, sample)."""
+    return _median(_around(place_m))
+
+
+def suspects(place_m: FloatArray, variance: FloatArray, middle_m: FloatArray) -> BoolArray:
+    """Return which samples disagree with their neighbours; NaN never does.
+
+    Hampel's filter about the running median, with the course's own slope taken off. Where both walls leave their course by
+    as much, to the same side or to opposite ones, it is the groove that clicks. For a first look, and for learning: what
+    it takes for a sharp bend of one wall it is allowed to lose.
+    """
+    slope = _slopes(middle_m)[..., None] * np.arange(-REACH, REACH + 1)
+    level = _around(place_m) - slope
+    middle = _median(level)
+    spread = _median(np.abs(level - middle[..., None]))
+    away = place_m - middle
+    with np.errstate(invalid="ignore"):
+        wild = np.abs(away) > HAMPEL_GATE * (np.sqrt(variance) + spread)
+        apart = np.minimum(np.abs(away[INNER] - away[OUTER]), np.abs(away[INNER] + away[OUTER]))
+        together = apart < HAMPEL_GATE * np.sqrt(variance.sum(axis=0))
+    return np.asarray(wild & ~together)
+
+
+def _around(values: FloatArray) -> FloatArray:
+    padded = np.pad(values, ((0, 0), (REACH, REACH)), constant_values=np.nan)
+    return np.lib.stride_tricks.sliding_window_view(padded, 2 * REACH + 1, axis=1)
+
+
+def _slopes(middle_m: FloatArray) -> FloatArray:
+    """Change of the running median from one sample to the next; 0 where that is not known."""
+    around = _around(middle_m)
+    slope = (around[..., -1] - around[..., 0]) / (2 * REACH)
+    return np.where(np.isfinite(slope), slope, 0.0)
+
+
+def _median(values: FloatArray) -> FloatArray:
+    """The median of the last axis without its NaN, the lower one of two; NaN where there are only those."""
+    known = np.count_nonzero(np.isfinite(values), axis=-1)
+    place = np.maximum(known - 1, 0)[..., None] // 2
+    return np.asarray(np.take_along_axis(np.sort(values, axis=-1), place, axis=-1)[..., 0])
 
 
 def _hand_over(before: Stretch, after: Stretch) -> tuple[Stretch, Stretch]:
@@ -92,8 +154,7 @@ def _hand_over(before: Stretch, after: Stretch) -> tuple[Stretch, Stretch]:
 
 def _faded(stretch: Stretch, fade: FloatArray, other: Stretch) -> Stretch:
     """The stretch with its share lowered wherever the other saw the same wall."""
-    step = stretch.arc_m[1] - stretch.arc_m[0] if stretch.arc_m.size > 1 else 1.0
-    nearest = np.rint((stretch.arc_m - other.arc_m[0]) / step).astype(np.int64)
+    nearest = np.rint((stretch.arc_m - other.arc_m[0]) / stretch.step_m).astype(np.int64)
     there = (nearest >= 0) & (nearest < other.arc_m.size)
     seen = np.isfinite(other.place_m[:, np.clip(nearest, 0, other.arc_m.size - 1)]) & there
     return replace(stretch, share=np.where(seen, stretch.share * np.clip(fade, 0.0, 1.0), stretch.share))

@@ -1,0 +1,279 @@
+"""The state of the groove in both directions, how it moves along the grid, and a smoother that outliers cannot fool.
+
+A first pass leaves out what disagrees with its nearest neighbours, and rejects what is further than the gate from its
+prediction; while it rejects, its error grows as fast as grooves move, so it cannot lose the groove for good. Smoothed
+backwards, that tells of each reading how far it lies from what all others say, and by this it is accepted or rejected once
+more, for a second pass, and so on until nothing changes. So what was rejected because the prediction was bad comes back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from gramoscope.conventions import BoolArray, FloatArray, IntArray
+from gramoscope.tonearm.groove_prior import SLOPE, STATES, GroovePrior, start
+from gramoscope.tonearm.linear_gaussian import (
+    Filtered,
+    FilterState,
+    Gate,
+    Moves,
+    Readings,
+    Smoothed,
+    backward,
+    blank,
+    forward,
+)
+
+ANYWHERE_M = 1e-3
+"""How little is known of where a passage begins, once its first sample is taken off."""
+PATIENCE = 64
+"""A wall that was seen so often where it was not expected has moved, or the filter has: a fifth of a millimetre."""
+DOUBT = 100.0
+"""How much surer than it is by right the first pass may be, as a variance, when it has lost a wall."""
+AGITATION_LIMIT = 1e4
+"""No neighbourhood is louder than its stretch by more, as a variance."""
+AGITATION_BINS, AGITATION_ROUNDS = 16, 6
+"""Size of a neighbourhood, and how often at the most its noise is raised."""
+AGITATED = 4.0
+"""Innovations so many times (as variances) as large as believed are no chance."""
+AGREEMENT = 9.0
+"""Square of the standard deviations that the second wall may be off the first."""
+NORMAL_MEDIAN = 0.455
+"""Median of the square of a normal number."""
+ROUNDS = 4
+"""At most so often is looked again which readings are outliers."""
+SLOPES = np.array([SLOPE, STATES + SLOPE])
+"""Where the lateral and the vertical slope (times the step) stand in the state."""
+
+
+@dataclass(frozen=True, eq=False)
+class GrooveModel:
+    """What is believed of both directions, lateral first, from a bin on.
+
+    Attributes
+    ----------
+    from_bin : int
+    slowest_per_m : float
+        The least λ: what forgets most slowly.
+    sigma : float64 array, shape (2,)
+        Of the slopes.
+    a, q : float64 arrays, shape (2, 6, 6)
+        One step of the grid.
+    covariance : float64 array, shape (12, 12)
+        Of the state before anything was seen.
+    agitation : float64 array, shape (bin,)
+        How many times q the noise has, from `from_bin` on; once, where it ends.
+    """
+
+    from_bin: int
+    slowest_per_m: float
+    sigma: FloatArray
+    a: FloatArray
+    q: FloatArray
+    covariance: FloatArray
+    agitation: FloatArray = field(default_factory=lambda: np.ones(1))
+
+
+@dataclass(frozen=True, eq=False)
+class Beliefs:
+    """The priors of both directions, made ready for a grid; see `beliefs`.
+
+    Attributes
+    ----------
+    priors : (GroovePrior, GroovePrior)
+        Lateral and vertical.
+    a, q : float64 arrays, shape (2, 6, 6)
+        For σ = 1.
+    at_rest : float64 array, shape (2, 5, 5)
+        The same.
+    sigma_of_bend : float64 array, shape (2,)
+    """
+
+    priors: tuple[GroovePrior, GroovePrior]
+    a: FloatArray
+    q: FloatArray
+    at_rest: FloatArray
+    sigma_of_bend: FloatArray
+
+    def model(self, from_bin: int, level: FloatArray) -> GrooveModel:
+        """Return what is believed at a level, shape (2,), from a bin on."""
+        bends = [prior.bends(one) for prior, one in zip(self.priors, level, strict=True)]
+        sigma = self.sigma_of_bend * np.array(bends)
+        covariance = np.zeros((2 * STATES, 2 * STATES))
+        for i in range(2):
+            part = slice(i * STATES, (i + 1) * STATES)
+            covariance[part, part] = start(self.at_rest[i], sigma[i], place_sigma_m=ANYWHERE_M)
+        slowest = min(prior.corner_per_m for prior in self.priors)
+        return GrooveModel(from_bin, slowest, sigma, self.a, sigma[:, None, None] ** 2 * self.q, covariance)
+
+
+def beliefs(priors: tuple[GroovePrior, GroovePrior], step_m: float) -> Beliefs:
+    """Return priors made ready for a grid."""
+    steps = [prior.steps(step_m) for prior in priors]
+    return Beliefs(
+        priors,
+        np.stack([a for a, _ in steps]),
+        np.stack([q for _, q in steps]),
+        np.stack([prior.at_rest(step_m) for prior in priors]),
+        np.array([1 / prior.bend(step_m) for prior in priors]),
+    )
+
+
+def which(models: Sequence[GrooveModel], bins: IntArray) -> IntArray:
+    """Return the number of the model that holds at each bin; before the first one begins it holds too."""
+    starts = [model.from_bin for model in models]
+    return np.maximum(np.searchsorted(starts, bins, side="right") - 1, 0)
+
+
+def moves(models: Sequence[GrooveModel], bins: IntArray) -> Moves:
+    """Return how the state moves from each bin to the next."""
+    here = which(models, bins)
+    agitation = np.ones(bins.size)
+    for number in np.unique(here):
+        model = models[number]
+        mine = np.flatnonzero(
+            (here == number) & (bins >= model.from_bin) & (bins < model.from_bin + model.agitation.size)
+        )
+        agitation[mine] = model.agitation[bins[mine] - model.from_bin]
+    return Moves(np.stack([m.a for m in models]), np.stack([m.q for m in models]), here, agitation)
+
+
+@dataclass(frozen=True, eq=False)
+class PassState:
+    """Where the first and the last pass go on, at a bin."""
+
+    bin: int
+    first: FilterState
+    last: FilterState
+
+
+def beginning(model: GrooveModel, first_bin: int) -> PassState:
+    """Return the state before anything was seen."""
+    return PassState(first_bin, blank(model.covariance), blank(model.covariance))
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """Result of `robustly`.
+
+    Attributes
+    ----------
+    smoothed : Smoothed
+        Slopes of both directions, times the step.
+    accepted : bool array, shape (reading,)
+    first, last : Filtered
+        The passes.
+    """
+
+    smoothed: Smoothed
+    accepted: BoolArray
+    first: Filtered
+    last: Filtered
+
+    def state(self, first_bin: int, bin_: int) -> PassState:
+        """Return where to go on at a bin; `first_bin` is where the passes began."""
+        return PassState(bin_, self.first.state(bin_ - first_bin), self.last.state(bin_ - first_bin))
+
+
+def robustly(steps: Moves, readings: Readings, trusted: BoolArray, begin: PassState, *, gate: float) -> Followed:
+    """Smooth the groove by readings some of which are wild.
+
+    Parameters
+    ----------
+    steps : Moves
+    readings : Readings
+    trusted : bool array, shape (reading,)
+        What the first pass may use.
+    begin : PassState
+    gate : float
+        Standard deviations.
+
+    Returns
+    -------
+    Followed
+    """
+    rule = Gate(gate, PATIENCE, ANYWHERE_M, DOUBT)
+    first = forward(steps, readings, begin.first, gate=rule, allowed=trusted)
+    accepted = backward(steps, readings, first, wanted=SLOPES[:0]).distance <= gate
+    lost, missed = _where_it_was_lost(first, readings)
+    accepted |= missed & trusted
+    for _ in range(ROUNDS):
+        last = forward(steps, readings, begin.last, gate=Gate(anywhere=ANYWHERE_M), allowed=accepted, lost=lost)
+        smoothed = backward(steps, readings, last, wanted=SLOPES)
+        used, accepted = accepted, smoothed.distance <= gate
+        if np.array_equal(used, accepted):
+            break
+    return Followed(smoothed, used, first, last)
+
+
+def _where_it_was_lost(first: Filtered, readings: Readings) -> tuple[BoolArray, BoolArray]:
+    """The bins where the place was lost, not those where that was noticed; and the readings that were missed between."""
+    lost, missed = np.zeros_like(first.lost), np.zeros(readings.bin.size, np.bool_)
+    for noticed in np.flatnonzero(first.lost):
+        for source in np.flatnonzero(first.missed[noticed] >= PATIENCE / 2):
+            begun = max(int(noticed - first.since[noticed, source]), 0)
+            lost[begun] = True
+            missed |= (readings.source == source) & (readings.bin >= begun) & (readings.bin < noticed)
+    return lost, missed
+
+
+def agitation(model: GrooveModel, readings: Readings, trusted: BoolArray) -> FloatArray:
+    """Return how much more restless the groove is, bin by bin of one stretch, than its model believes.
+
+    The level of a stretch is one number, and clicks and attacks are short. Where half of the innovations of a
+    neighbourhood are larger than they should be, the groove moves and nothing is wrong with the readings: there the noise
+    that drives it is raised until they are not.
+
+    Parameters
+    ----------
+    model : GrooveModel
+    readings : Readings
+        Of one stretch, bins counted from the model's first.
+    trusted : bool array, shape (reading,)
+
+    Returns
+    -------
+    float64 array, shape (bin,)
+        1 where all is as believed.
+    """
+    bins = int(readings.bin[-1]) + 1 if readings.bin.size else 1
+    factor = np.ones(bins)
+    for _ in range(AGITATION_ROUNDS):
+        restless = replace(model, from_bin=0, agitation=factor)
+        found = forward(moves([restless], np.arange(bins)), readings, blank(model.covariance), allowed=trusted)
+        excess = _excess(*_surprise(found, readings, trusted), bins)
+        if not (excess > 1).any():
+            break
+        factor = np.minimum(factor * np.where(excess > 1, excess**2, 1.0), AGITATION_LIMIT)
+    return factor
+
+
+def _surprise(found: Filtered, readings: Readings, trusted: BoolArray) -> tuple[IntArray, FloatArray]:
+    """Bins that both walls read, and by how many variances both differ from their prediction; 0 where they disagree.
+
+    One wall alone can be wrong by itself; a groove that moves takes both, to the same side or to opposite ones.
+    """
+    one = np.flatnonzero((readings.bin[1:] == readings.bin[:-1]) & trusted[1:] & trusted[:-1])
+    h, bins = readings.h, readings.bin
+    away = readings.value - np.einsum("ij,ij->i", h, found.mean[bins])
+    spread = np.einsum("ij,ijk,ik->i", h, found.covariance[bins], h) + readings.variance
+    apart = np.minimum((away[one] - away[one + 1]) ** 2, (away[one] + away[one + 1]) ** 2)
+    agree = apart < AGREEMENT * (readings.variance[one] + readings.variance[one + 1])
+    share = away**2 / spread
+    return bins[one], np.where(agree, np.minimum(share[one], share[one + 1]), 0.0)
+
+
+def _excess(bins: IntArray, surprise: FloatArray, size: int) -> FloatArray:
+    """The median of the surprise about each bin, over that of a normal number, if it is large; else 1."""
+    excess = np.ones(size)
+    for first in range(0, size, AGITATION_BINS // 2):
+        near = surprise[(bins >= first) & (bins < first + AGITATION_BINS)]
+        if near.size >= AGITATION_BINS // 2:
+            ratio = float(np.median(near)) / NORMAL_MEDIAN
+            if ratio > AGITATED:
+                here = excess[first : first + AGITATION_BINS]
+                np.maximum(here, ratio, out=here)
+    return excess

@@ -1,0 +1,114 @@
+"""Samples of both walls in a row, as they are read by the smoother of places."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gramoscope.conventions import BoolArray, FloatArray, IntArray
+from gramoscope.quality import FlagArray
+from gramoscope.tonearm.groove_prior import taylor
+from gramoscope.tonearm.linear_gaussian import Readings
+from gramoscope.tonearm.stretches import Stretch
+
+LEAST_SHARE = 1e-3
+"""Samples that keep less of their information are left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlaceSamples:
+    """Samples of either wall.
+
+    Attributes
+    ----------
+    arc_m : float64 array, shape (sample,)
+    bin : int64 array, shape (sample,)
+        Of the grid, nearest to each.
+    wall : int64 array, shape (sample,)
+    place_m : float64 array, shape (sample,)
+        NaN where nothing was measured, or where the neighbouring stretch has the word.
+    variance, gate_variance : float64 arrays, shape (sample,)
+        By its share of the information, and as it was measured.
+    suspect : bool array, shape (sample,)
+    flags : uint16 array, shape (sample,)
+    """
+
+    arc_m: FloatArray
+    bin: IntArray
+    wall: IntArray
+    place_m: FloatArray
+    variance: FloatArray
+    gate_variance: FloatArray
+    suspect: BoolArray
+    flags: FlagArray
+
+    def part(self, keep: BoolArray | IntArray) -> PlaceSamples:
+        """Return some of the samples."""
+        return PlaceSamples(
+            self.arc_m[keep],
+            self.bin[keep],
+            self.wall[keep],
+            self.place_m[keep],
+            self.variance[keep],
+            self.gate_variance[keep],
+            self.suspect[keep],
+            self.flags[keep],
+        )
+
+    def flagged(self, flags: FlagArray) -> PlaceSamples:
+        """Return the same samples with other flags."""
+        return replace(self, flags=flags.astype(np.uint16))
+
+    def measured(self, first_bin: int, stop_bin: int) -> IntArray:
+        """Return the numbers of the samples that say something of the bins from … to, in the order of the bins."""
+        here = np.flatnonzero(np.isfinite(self.place_m) & (self.bin >= first_bin) & (self.bin < stop_bin))
+        return here[np.argsort(self.bin[here], kind="stable")]
+
+    def readings(self, *, first_bin: int, step_m: float, gains: FloatArray) -> Readings:
+        """Return measured samples, in the order of their bins, as readings of the state of both directions.
+
+        Parameters
+        ----------
+        first_bin : int
+            The bin that the readings call 0.
+        step_m : float
+            Of the grid.
+        gains : float64 array, shape (2,)
+            How far the inner and the outer wall move towards +l when the groove rises by one.
+        """
+        row = taylor(self.arc_m / step_m - self.bin)
+        h = np.concatenate([row, row * gains[self.wall][:, None]], axis=1)
+        return Readings(self.bin - first_bin, self.wall, h, self.place_m, self.variance, self.gate_variance)
+
+
+def samples_of(stretch: Stretch, step_m: float) -> PlaceSamples:
+    """Return the samples of one stretch, both walls in turn."""
+    keeps = np.maximum(stretch.share, LEAST_SHARE)
+    place = np.where(stretch.share > LEAST_SHARE, stretch.place_m, np.nan)
+    arc = np.repeat(stretch.arc_m, 2)
+    return PlaceSamples(
+        arc,
+        np.rint(arc / step_m).astype(np.int64),
+        np.tile(np.arange(2), stretch.arc_m.size),
+        place.ravel(order="F"),
+        (stretch.variance * stretch.correlation_samples / keeps).ravel(order="F"),
+        stretch.variance.ravel(order="F"),
+        stretch.suspect.ravel(order="F"),
+        stretch.flags.ravel(order="F"),
+    )
+
+
+def joined(pieces: Sequence[PlaceSamples]) -> PlaceSamples:
+    """Return the samples of several pieces in a row."""
+    return PlaceSamples(
+        np.concatenate([piece.arc_m for piece in pieces]),
+        np.concatenate([piece.bin for piece in pieces]),
+        np.concatenate([piece.wall for piece in pieces]),
+        np.concatenate([piece.place_m for piece in pieces]),
+        np.concatenate([piece.variance for piece in pieces]),
+        np.concatenate([piece.gate_variance for piece in pieces]),
+        np.concatenate([piece.suspect for piece in pieces]),
+        np.concatenate([piece.flags for piece in pieces]),
+    )

@@ -1,0 +1,138 @@
+"""Who teaches the smoother of places: stretches in, each with what is to be believed of the groove where it lies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice, tee
+from typing import get_args
+
+import numpy as np
+
+from gramoscope.conventions import FloatArray
+from gramoscope.disc.formats import Direction
+from gramoscope.tonearm.course import Course
+from gramoscope.tonearm.groove_model import Beliefs, GrooveModel, agitation, beginning, beliefs, moves, robustly
+from gramoscope.tonearm.groove_prior import GroovePrior
+from gramoscope.tonearm.learn_groove import PriorLimits, learn, lesson
+from gramoscope.tonearm.level import OneDirection, Walls, bend_power, calmed, levels, one_direction, trusted
+from gramoscope.tonearm.place_samples import samples_of
+from gramoscope.tonearm.stretches import Stretch
+
+DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
+FIRST_TEACHERS, TEACHERS = 24, 8
+"""So many stretches of those that a prior is learned from are looked at, the first time and later."""
+
+Priors = tuple[GroovePrior, GroovePrior]
+Levelled = tuple[Stretch, FloatArray]
+
+
+@dataclass(frozen=True)
+class Teaching:
+    """How priors are learned; see `tonearm.places.PlaceSmoother`."""
+
+    groups: int
+    corner_limits_hz: tuple[float, float]
+    cutoff_limits_hz: tuple[float, float]
+    floor_m_s: float
+    other_floor_m_s: float
+
+
+@dataclass(frozen=True)
+class Teacher:
+    """Finds out what to believe of one groove, on one grid.
+
+    Parameters
+    ----------
+    course : Course
+    step_m : float
+        Of the grid.
+    teaching : Teaching
+    gate : float
+        Samples further than this many standard errors from what the others say teach nothing.
+    """
+
+    course: Course
+    step_m: float
+    teaching: Teaching
+    gate: float
+
+    def taught(self, stretches: Iterator[Stretch]) -> Iterator[tuple[Stretch, GrooveModel]]:
+        """Return each stretch with what is believed of the groove from its first sample on."""
+        before: Priors | None = None
+        levelled = self._levelled(stretches)
+        while batch := list(islice(levelled, self.teaching.groups)):
+            before = self._learn(batch, before)
+            believed = beliefs(before, self.step_m)
+            for stretch, level in batch:
+                model = self._model(believed, stretch, level)
+                yield stretch, replace(model, agitation=self._agitation(model, stretch))
+
+    def _model(self, believed: Beliefs, stretch: Stretch, level: FloatArray) -> GrooveModel:
+        return believed.model(int(np.rint(stretch.arc_m[0] / self.step_m)), level)
+
+    def _agitation(self, model: GrooveModel, stretch: Stretch) -> FloatArray:
+        samples = samples_of(stretch, self.step_m)
+        first = int(samples.bin[0])
+        fresh = samples.part(samples.measured(first, int(samples.bin[-1]) + 1))
+        readings = fresh.readings(first_bin=first, step_m=self.step_m, gains=self.course.gains)
+        return agitation(model, readings, ~fresh.suspect)
+
+    def _levelled(self, stretches: Iterator[Stretch]) -> Iterator[Levelled]:
+        """Return each stretch with its level in both directions."""
+        one, other = tee(stretches)
+        yield from zip(one, levels(map(self._powers, other)), strict=True)
+
+    def _seen(self, walls: Walls, direction: Direction) -> OneDirection:
+        return one_direction(walls, direction, self.course.gains, listening=direction == self.course.direction)
+
+    def _powers(self, stretch: Stretch) -> FloatArray:
+        seen = (self._seen(calmed(stretch), name) for name in DIRECTIONS)
+        return np.array([bend_power(one, self.step_m) for one in seen])
+
+    def _learn(self, batch: Sequence[Levelled], before: Priors | None) -> Priors:
+        limits = [self._limits(name, float(batch[0][0].arc_m[0])) for name in DIRECTIONS]
+        count = min(FIRST_TEACHERS if before is None else TEACHERS, len(batch))
+        chosen = [batch[i] for i in np.linspace(0, len(batch) - 1, count).round().astype(int)]
+        believed = beliefs(before or (limits[0].middle, limits[1].middle), self.step_m)
+        teachers = [(self._cleaned(believed, stretch, level), level) for stretch, level in chosen]
+        lateral, vertical = (
+            learn(
+                [
+                    one
+                    for one in (lesson(self._seen(trusted(s), name), float(level[i])) for s, level in teachers)
+                    if one
+                ],
+                self.step_m,
+                limits[i],
+                before=before[i] if before else None,
+            )
+            for i, name in enumerate(DIRECTIONS)
+        )
+        return lateral, vertical
+
+    def _cleaned(self, believed: Beliefs, stretch: Stretch, level: FloatArray) -> Stretch:
+        """The stretch with all those samples suspect that the others contradict, by what was believed so far."""
+        model = self._model(believed, stretch, level)
+        samples = samples_of(stretch, self.step_m)
+        first, stop = int(samples.bin[0]), int(samples.bin[-1]) + 1
+        measured = samples.measured(first, stop)
+        fresh = samples.part(measured)
+        followed = robustly(
+            moves([model], np.arange(first, stop)),
+            fresh.readings(first_bin=first, step_m=self.step_m, gains=self.course.gains),
+            ~fresh.suspect,
+            beginning(model, first),
+            gate=self.gate,
+        )
+        suspect = samples.suspect.copy()
+        suspect[measured] = ~followed.accepted
+        return replace(stretch, suspect=suspect.reshape(2, -1, order="F"))
+
+    def _limits(self, direction: Direction, arc_m: float) -> PriorLimits:
+        speed = float(self.course.rotation.speed_at_m_s(arc_m))
+        mine = direction == self.course.direction
+        floor = self.teaching.floor_m_s if mine else self.teaching.other_floor_m_s
+        (low, high), (lowest, highest) = self.teaching.corner_limits_hz, self.teaching.cutoff_limits_hz
+        per_hz = 2 * np.pi / speed
+        return PriorLimits(floor / speed, (per_hz * low, per_hz * high), (per_hz * lowest, per_hz * highest))
