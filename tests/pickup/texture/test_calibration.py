@@ -103,6 +103,16 @@ def test_measured_stands_beside_stated_in_micrometres_and_degrees() -> None:
     )
 
 
+def test_a_wall_that_is_steep_on_paper_makes_a_deep_step_of_a_wide_one() -> None:
+    steep = replace(BENCH, disc=replace(BENCH.disc, wall_angle_rad=np.deg2rad(50.0)))
+    layout = _layout(steep)
+    told = calibration_of(layout, _model(layout), steep, 23)
+    glass = steep.cover_glass
+    assert glass is not None
+    assert told["focus_shift_um"]["if_walls_are_as_stated"] == pytest.approx(1e6 * glass.shift_m)
+    assert told["wall_angle_deg"]["if_the_glass_is_as_stated"] == pytest.approx(50.0)
+
+
 def test_every_stripe_says_how_much_it_can_be_trusted() -> None:
     layout = _layout()
     hidden, *seen = calibration_of(layout, _model(layout), BENCH, 23)["stripes"]

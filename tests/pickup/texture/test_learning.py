@@ -12,9 +12,10 @@ import pytest
 
 from gramoscope.conventions import FloatArray
 from gramoscope.errors import ArgumentError
+from gramoscope.pickup.texture import learning as learning_module
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.learning import Learning, Lesson
-from gramoscope.pickup.texture.reading import Evidence, Model, Rules, Stretch, read
+from gramoscope.pickup.texture.reading import Evidence, Model, Rules, Stretch, evidence, read
 
 SHORT = Learning(half_px=9, largest_lag_px=60, loading=(0.03, 0.01, 0.003), least_columns=3000, folds=3)
 RULES = Rules()
@@ -120,6 +121,22 @@ def test_no_stretch_is_read_by_spectra_that_it_helped_to_make(stretches: list[St
         else:
             assert min(apart) > 0.4
     assert not _same(one.whole, other.whole)
+
+
+def test_paths_are_moved_by_what_the_other_folds_taught(
+    stretches: list[Stretch], layout: StripeLayout, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    moved_by: list[Model] = []
+
+    def noted(stretch: Stretch, model: Model, rules: Rules) -> Evidence:
+        moved_by.append(model)
+        return evidence(stretch, model, rules)
+
+    monkeypatch.setattr(learning_module, "evidence", noted)
+    (lesson,) = _learned(stretches[:7], layout, loading=(0.03,), least_columns=1000)
+    assert len(moved_by) == 7
+    for number, model in enumerate(moved_by):
+        assert model is lesson.without[number % 3]
 
 
 def test_the_inputs_stay_as_they_were(stretches: list[Stretch], layout: StripeLayout) -> None:

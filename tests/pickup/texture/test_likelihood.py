@@ -166,7 +166,7 @@ def test_the_quiet_power_of_white_noise_is_its_variance_whatever_is_missing(sigm
     rng = np.random.default_rng(9)
     valid = np.ones(1200, bool)
     valid[300:480] = False
-    weight = softened(valid).astype(np.float64)
+    weight = 0.5 * softened(valid).astype(np.float64)
     powers = np.sum([quiet_power(sigma * rng.normal(size=1200), weight) for _ in range(60)], axis=0)
     assert powers[0] / powers[1] == pytest.approx(sigma**2, rel=0.06)
 
