@@ -80,6 +80,14 @@ def test_a_path_takes_no_forbidden_step() -> None:
     assert value == 9.0
 
 
+def test_a_step_costs_as_its_square() -> None:
+    score = np.full((2, 3, 1), -10.0)
+    score[0, 0], score[1, 0], score[1, 2] = 0.0, 0.0, 1.0
+    steps = np.array([2, 0])
+    assert best_path(score, steps, np.array([0.24, 0.0]))[1] == pytest.approx(1 - 4 * 0.24)
+    assert best_path(score, steps, np.array([0.26, 0.0]))[1] == 0.0
+
+
 QUIET = _wave(9, 41) + _wave(4, 17)
 LOUD = {f"loud {phase}": _wave(190, 430, phase) for phase in (0.0, 0.9, 2.1, 3.4, 5.2)}
 """Swings of ± 74 µm at a third of a row a column: stripes cross the glass edge, and the fourth one comes in."""
