@@ -9,7 +9,7 @@ learned but given (`tonearm.level`).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,15 +17,19 @@ from scipy import optimize
 
 from gramoscope.conventions import FloatArray
 from gramoscope.tonearm.groove_prior import GroovePrior, start, taylor
-from gramoscope.tonearm.level import LEAST_SAMPLES, OneDirection
+from gramoscope.tonearm.level import LEAST_SAMPLES, OneDirection, slope_power
 from gramoscope.tonearm.linear_gaussian import Gate, Moves, Readings, blank, forward
 
 GATE = 4.0
 """Samples further than this many standard errors from their prediction count as if they lay right there."""
-DRIFT = np.array([0.7, 0.35, 0.35])
-"""How much λ, μ and the share are expected to change from one learning to the next, e-folds."""
+DRIFT = np.array([0.7, 0.35, 0.35, 0.1])
+"""How much λ, μ, the share and the noise are expected to change from one learning to the next, e-folds."""
 SHARES = (0.3, 10.0)
 """Least and largest bend, for each unit of the level."""
+SLOPE_SIGMA = 0.05
+"""By how much the rms of the slopes may be off, e-folds: firm, for the likelihood has thousands of samples to argue with."""
+NOISES = (0.5, 3.0)
+"""Least and largest error of the readings, for each unit of what they claim."""
 ANYWHERE_M = 1e-4
 """How little is known of the place at which a stretch begins, once its first sample is taken off."""
 
@@ -48,31 +52,33 @@ class PriorLimits:
 
     @property
     def logarithms(self) -> FloatArray:
-        """Of least and largest, shape (3, 2)."""
-        return np.log([self.corner_per_m, self.cutoff_per_m, SHARES])
+        """Of least and largest, shape (4, 2)."""
+        return np.log([self.corner_per_m, self.cutoff_per_m, SHARES, NOISES])
 
     @property
     def middle(self) -> GroovePrior:
         """What is believed when nothing can be learned."""
-        return _prior(np.array([*self.logarithms[:2].mean(axis=1), 0.0]), self)
+        return _prior(np.array([*self.logarithms[:2].mean(axis=1), 0.0, 0.0]), self)
 
 
 @dataclass(frozen=True, eq=False)
 class Lesson:
-    """What one stretch teaches of one direction: its readings, and how loud it is."""
+    """What one stretch teaches of one direction: its readings, how loud it is, and the mean square of its slopes."""
 
     readings: Readings
     level: float
+    slope_power: float
 
 
-def lesson(one: OneDirection, level: float) -> Lesson | None:
+def lesson(one: OneDirection, level: float, step_m: float) -> Lesson | None:
     """Return what a stretch teaches; None when it was hardly seen."""
     known = np.flatnonzero(np.isfinite(one.place_m))
     if known.size < LEAST_SAMPLES:
         return None
     place, variance = one.place_m[known], one.variance[known]
     h = np.repeat(taylor(np.zeros(1)), known.size, axis=0)
-    return Lesson(Readings(known - known[0], np.zeros_like(known), h, place - place[0], variance, variance), level)
+    readings = Readings(known - known[0], np.zeros_like(known), h, place - place[0], variance, variance)
+    return Lesson(readings, level, slope_power(one, step_m))
 
 
 def learn(
@@ -92,16 +98,22 @@ def learn(
     Returns
     -------
     GroovePrior
-        By bounded Nelder–Mead over the logarithms of λ, μ and the share; `before`, or the middle of the limits, when there
+        By bounded Nelder–Mead over the logarithms of λ, μ, share and noise; `before`, or the middle of the limits, when there
         are no lessons.
     """
     if not lessons:
         return before or limits.middle
-    known, first, step = _logarithms(before or limits.middle), _logarithms(limits.middle), np.array([1.0, -0.7, 0.4])
+    known, first, step = (
+        _logarithms(before or limits.middle),
+        _logarithms(limits.middle),
+        np.array([1.0, -0.7, 0.4, 0.2]),
+    )
 
     def cost(logarithms: FloatArray) -> float:
-        change = (logarithms - known) / DRIFT if before else np.zeros(3)
-        return 0.5 * float(change @ change) - _log_likelihood(lessons, step_m, _prior(logarithms, limits))
+        change = (logarithms - known) / DRIFT if before else np.zeros(4)
+        prior = _prior(logarithms, limits)
+        disbelief = 0.5 * float(change @ change) + 0.5 * _louder(lessons, step_m, prior) ** 2
+        return disbelief - _log_likelihood(lessons, step_m, prior)
 
     # what was learned in silence can be so far off that nothing leads away from it
     if before and cost(known) <= cost(first):
@@ -109,12 +121,26 @@ def learn(
     return _prior(_least(cost, first, step, limits.logarithms), limits)
 
 
+def _louder(lessons: Sequence[Lesson], step_m: float, prior: GroovePrior) -> float:
+    """How many standard errors louder the prior believes the groove to be than its slopes are.
+
+    The likelihood knows the spectrum best where it meets the noise; extrapolated to the bass from there, it would fill gaps
+    with thunder.
+    """
+    power = np.array([one.slope_power for one in lessons])
+    known = np.isfinite(power)
+    believed = np.array([prior.bends(one.level) / prior.bend(step_m) for one in lessons])
+    if not known.any() or np.mean(power[known]) <= 0:
+        return 0.0
+    return float(0.5 * np.log(np.mean(believed[known] ** 2) / np.mean(power[known])) / SLOPE_SIGMA)
+
+
 def _least(cost: Callable[[FloatArray], float], first: FloatArray, step: FloatArray, bounds: FloatArray) -> FloatArray:
     inside = np.clip(first, *bounds.T)
     there = inside + step
     step = np.where((there < bounds[:, 0]) | (there > bounds[:, 1]), -step, step)
-    simplex = inside + np.vstack([np.zeros(3), np.diag(step)])
-    options: Any = {"xatol": 0.1, "fatol": 0.3, "maxfev": 80, "initial_simplex": np.clip(simplex, *bounds.T)}
+    simplex = inside + np.vstack([np.zeros(4), np.diag(step)])
+    options: Any = {"xatol": 0.1, "fatol": 0.3, "maxfev": 120, "initial_simplex": np.clip(simplex, *bounds.T)}
     found = optimize.minimize(cost, inside, method="Nelder-Mead", bounds=optimize.Bounds(*bounds.T), options=options)
     return np.asarray(found.x)
 
@@ -128,14 +154,16 @@ def _log_likelihood(lessons: Sequence[Lesson], step_m: float, prior: GroovePrior
         bins = int(one.readings.bin[-1]) + 1
         moves = Moves(a[None, None], sigma**2 * q[None, None], np.zeros(bins, np.int64), np.ones(bins))
         covariance = start(at_rest, sigma, place_sigma_m=ANYWHERE_M)
-        total += forward(moves, one.readings, blank(covariance), gate=Gate(GATE)).log_likelihood
+        variance = prior.noise**2 * one.readings.variance
+        readings = replace(one.readings, variance=variance, gate_variance=variance)
+        total += forward(moves, readings, blank(covariance), gate=Gate(GATE)).log_likelihood
     return total
 
 
 def _logarithms(prior: GroovePrior) -> FloatArray:
-    return np.log([prior.corner_per_m, prior.cutoff_per_m, prior.share])
+    return np.log([prior.corner_per_m, prior.cutoff_per_m, prior.share, prior.noise])
 
 
 def _prior(logarithms: FloatArray, limits: PriorLimits) -> GroovePrior:
-    corner, cutoff, share = np.exp(np.clip(logarithms, *limits.logarithms.T))
-    return GroovePrior(float(corner), float(cutoff), float(share), limits.floor)
+    corner, cutoff, share, noise = np.exp(np.clip(logarithms, *limits.logarithms.T))
+    return GroovePrior(float(corner), float(cutoff), float(share), limits.floor, float(noise))

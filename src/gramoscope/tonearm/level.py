@@ -104,6 +104,17 @@ def bend_power(one: OneDirection, step_m: float) -> float:
     return float(power / (lag * step_m) ** 2)
 
 
+def slope_power(one: OneDirection, step_m: float) -> float:
+    """Return the mean square of the slopes of one stretch over `BEND_M`; below zero by chance when silent, or NaN."""
+    lag = max(int(np.rint(BEND_M / step_m)), 1)
+    moved = one.place_m[lag:] - one.place_m[:-lag]
+    noise = one.variance[lag:] + one.variance[:-lag]
+    seen = np.isfinite(moved) & np.isfinite(noise)
+    if np.count_nonzero(seen) < LEAST_SAMPLES:
+        return float("nan")
+    return float((np.mean(moved[seen] ** 2) - np.mean(noise[seen])) / (lag * step_m) ** 2)
+
+
 def levels(powers: Iterable[FloatArray]) -> Iterator[FloatArray]:
     """Return the level of each stretch: the root of the mean of its own bend's power and its neighbours'.
 

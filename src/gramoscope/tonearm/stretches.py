@@ -16,9 +16,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gramoscope.conventions import INNER, OUTER, BoolArray, FloatArray
-from gramoscope.quality import NOT_MEASURED, FlagArray
+from gramoscope.quality import NOT_MEASURED, FlagArray, Quality
 from gramoscope.signal_path import WallTrace
 
+LEAST_SEEN = 0.2
+"""A wall that shows less of a stretch is not believed there."""
 REACH = 3
 """So many neighbours on each side take part in a median."""
 HAMPEL_GATE = 3.0
@@ -60,9 +62,14 @@ class Stretch:
 
 
 def stretch_of(trace: WallTrace) -> Stretch:
-    """Return the places of a trace; what was not measured is NaN, and flagged so."""
+    """Return the places of a trace; what was not measured is NaN, and flagged so.
+
+    So is a wall of which hardly anything was seen in the whole stretch: what was seen is a guess.
+    """
     flagged = (trace.flags & np.uint16(NOT_MEASURED)) != 0
     seen = np.isfinite(trace.offset_m) & (trace.offset_sigma_m > 0) & np.isfinite(trace.offset_sigma_m) & ~flagged
+    sparse = seen & (seen.mean(axis=1, keepdims=True) < LEAST_SEEN)
+    seen &= ~sparse
     place, variance = np.where(seen, trace.offset_m, np.nan), np.where(seen, trace.offset_sigma_m**2, np.nan)
     middle = running_median(place)
     return Stretch(
@@ -72,7 +79,7 @@ def stretch_of(trace: WallTrace) -> Stretch:
         middle_m=middle,
         suspect=suspects(place, variance, middle),
         share=np.ones(trace.flags.shape),
-        flags=np.where(seen, trace.flags, trace.flags | np.uint16(NOT_MEASURED)).astype(np.uint16),
+        flags=(trace.flags | np.where(seen, 0, NOT_MEASURED) | np.where(sparse, Quality.SPARSE, 0)).astype(np.uint16),
         step_m=trace.arc_step_m,
         correlation_samples=trace.correlation_samples,
     )

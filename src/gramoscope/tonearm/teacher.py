@@ -64,7 +64,9 @@ class Teacher:
         while batch := list(islice(levelled, self.teaching.groups)):
             before = self._learn(batch, before)
             believed = beliefs(before, self.step_m)
-            for stretch, level in batch:
+            noise = before[DIRECTIONS.index(self.course.direction)].noise
+            for claimed, level in batch:
+                stretch = replace(claimed, variance=noise**2 * claimed.variance)
                 model = self._model(believed, stretch, level)
                 yield stretch, replace(model, agitation=self._agitation(model, stretch))
 
@@ -100,7 +102,9 @@ class Teacher:
             learn(
                 [
                     one
-                    for one in (lesson(self._seen(trusted(s), name), float(level[i])) for s, level in teachers)
+                    for one in (
+                        lesson(self._seen(trusted(s), name), float(level[i]), self.step_m) for s, level in teachers
+                    )
                     if one
                 ],
                 self.step_m,
