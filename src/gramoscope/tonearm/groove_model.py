@@ -269,6 +269,8 @@ def _surprise(found: Filtered, readings: Readings, trusted: BoolArray) -> tuple[
 def _excess(bins: IntArray, surprise: FloatArray, size: int) -> FloatArray:
     """The median of the surprise about each bin, over that of a normal number, if it is large; else 1."""
     excess = np.ones(size)
+    if np.count_nonzero(surprise > AGITATED * NORMAL_MEDIAN) < AGITATION_BINS // 4:
+        return excess
     for first in range(0, size, AGITATION_BINS // 2):
         near = surprise[(bins >= first) & (bins < first + AGITATION_BINS)]
         if near.size >= AGITATION_BINS // 2:

@@ -118,7 +118,7 @@ def learn(
     # what was learned in silence can be so far off that nothing leads away from it
     if before and cost(known) <= cost(first):
         first, step = known, 0.4 * step
-    return _prior(_least(cost, first, step, limits.logarithms), limits)
+    return _prior(_least(cost, first, step, limits.logarithms, 60 if before else 120), limits)
 
 
 def _louder(lessons: Sequence[Lesson], step_m: float, prior: GroovePrior) -> float:
@@ -129,18 +129,20 @@ def _louder(lessons: Sequence[Lesson], step_m: float, prior: GroovePrior) -> flo
     """
     power = np.array([one.slope_power for one in lessons])
     known = np.isfinite(power)
-    believed = np.array([prior.bends(one.level) / prior.bend(step_m) for one in lessons])
+    believed = np.array([prior.bends(one.level) for one in lessons]) / prior.bend(step_m)
     if not known.any() or np.mean(power[known]) <= 0:
         return 0.0
     return float(0.5 * np.log(np.mean(believed[known] ** 2) / np.mean(power[known])) / SLOPE_SIGMA)
 
 
-def _least(cost: Callable[[FloatArray], float], first: FloatArray, step: FloatArray, bounds: FloatArray) -> FloatArray:
+def _least(
+    cost: Callable[[FloatArray], float], first: FloatArray, step: FloatArray, bounds: FloatArray, looks: int
+) -> FloatArray:
     inside = np.clip(first, *bounds.T)
     there = inside + step
     step = np.where((there < bounds[:, 0]) | (there > bounds[:, 1]), -step, step)
     simplex = inside + np.vstack([np.zeros(4), np.diag(step)])
-    options: Any = {"xatol": 0.1, "fatol": 0.3, "maxfev": 120, "initial_simplex": np.clip(simplex, *bounds.T)}
+    options: Any = {"xatol": 0.1, "fatol": 0.3, "maxfev": looks, "initial_simplex": np.clip(simplex, *bounds.T)}
     found = optimize.minimize(cost, inside, method="Nelder-Mead", bounds=optimize.Bounds(*bounds.T), options=options)
     return np.asarray(found.x)
 

@@ -20,7 +20,7 @@ from gramoscope.tonearm.place_samples import samples_of
 from gramoscope.tonearm.stretches import Stretch
 
 DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
-FIRST_TEACHERS, TEACHERS = 24, 8
+FIRST_TEACHERS, TEACHERS = 24, 6
 """So many stretches of those that a prior is learned from are looked at, the first time and later."""
 
 Priors = tuple[GroovePrior, GroovePrior]
