@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from gramoscope.tonearm.groove_prior import BEND_M, SLOPE, STATES, GroovePrior, start, taylor
+from gramoscope.tonearm.groove_prior import BEND_M, SLOPE, GroovePrior, start, taylor
+from gramoscope.tonearm.small_matrices import STATES
 
 STEP_M = 3.1e-6
 PRIORS = [GroovePrior(2.1e4, 4.7e4), GroovePrior(2e3, 4e5), GroovePrior(7e3, 6.6e3), GroovePrior(1.3e5, 4e5)]

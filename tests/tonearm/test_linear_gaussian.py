@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gramoscope.tonearm.groove_prior import SLOPE, STATES, GroovePrior, start
+from gramoscope.tonearm.bryson_frazier import backward, smooth_reference
+from gramoscope.tonearm.groove_prior import SLOPE, GroovePrior, start
 from gramoscope.tonearm.linear_gaussian import (
     FilterState,
     Gate,
     Moves,
     Readings,
-    backward,
     blank,
     forward,
-    smooth_reference,
 )
+from gramoscope.tonearm.small_matrices import STATES
 
 STEP_M = 3.1e-6
 LATERAL, VERTICAL = GroovePrior(2.1e4, 4.7e4), GroovePrior(6e3, 2.2e4)

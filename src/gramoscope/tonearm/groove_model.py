@@ -14,18 +14,18 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from gramoscope.conventions import BoolArray, FloatArray, IntArray
-from gramoscope.tonearm.groove_prior import SLOPE, STATES, GroovePrior, start
+from gramoscope.tonearm.bryson_frazier import Smoothed, backward
+from gramoscope.tonearm.groove_prior import SLOPE, GroovePrior, start
 from gramoscope.tonearm.linear_gaussian import (
     Filtered,
     FilterState,
     Gate,
     Moves,
     Readings,
-    Smoothed,
-    backward,
     blank,
     forward,
 )
+from gramoscope.tonearm.small_matrices import STATES
 
 ANYWHERE_M = 1e-3
 """How little is known of where a passage begins, once its first sample is taken off."""

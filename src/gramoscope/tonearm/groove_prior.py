@@ -29,11 +29,12 @@ import numba
 import numpy as np
 
 from gramoscope.conventions import FloatArray
+from gramoscope.tonearm.small_matrices import STATES
 
-CORNER_POLES, CUTOFF_POLES = 2, 3
-ORDER = CORNER_POLES + CUTOFF_POLES
-"""Poles of the slope."""
-STATES = ORDER + 1
+ORDER = STATES - 1
+"""Poles of the slope: five."""
+CORNER_POLES = 2
+CUTOFF_POLES = ORDER - CORNER_POLES
 SLOPE = 1
 """Where the slope (times Δ) stands in the state."""
 BEND_M = 50e-6

@@ -1,20 +1,11 @@
-"""Kalman filter and smoother on an even grid, for a state of blocks that move alike and are seen together.
+"""Kalman's filter on an even grid, for a state of blocks that move alike and are seen together.
 
 From one bin of the grid to the next each block b of the state moves by its own A_b with noise Q_b; a bin may carry any
-number of scalar observations y = h·x + noise, taken one after the other, each with its own h and variance. With innovation
-ν, its variance S and gain K = Ph/S, the forward pass is Kalman's. Backwards runs the smoother of Bryson and Frazier as
-modified by Bierman (*Fixed interval smoothing with discrete measurements*, Int. J. Control 18, 1973): with L = 1 − Khᵀ,
+number of scalar readings y = h·x + noise, taken one after the other, each with its own h and variance: with innovation ν,
+its variance S and gain K = Ph/S the state moves by Kν and its covariance by −K S Kᵀ (Kalman, 1960). Backwards goes
+`tonearm.bryson_frazier`.
 
-    r ← h ν/S + Lᵀ r,      N ← h hᵀ/S + Lᵀ N L      at an observation,
-    r ← Aᵀ r,              N ← Aᵀ N A               from bin to bin,
-    x = m + P r,           C = P − P N P            for m, P predicted at the bin.
-
-It inverts nothing but scalars, so bins without observations, starts of which nothing is known and nearly singular
-covariances are no trouble to it. What all *other* observations say of one of them falls out on the way: with
-e = ν/S − K·r and D = 1/S + KᵀNK the residual against them is e/D, and 1/D its variance (de Jong, *A cross-validation filter
-for time series models*, Biometrika 75, 1988).
-
-The kernels take C-contiguous float64 arrays; `smooth_reference` does the same in NumPy, the way of the textbooks.
+The kernels take C-contiguous float64 arrays.
 """
 
 from __future__ import annotations
@@ -23,12 +14,10 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from scipy import linalg
 
 from gramoscope.conventions import BoolArray, FloatArray, IntArray
+from gramoscope.tonearm.small_matrices import STATES, block_sandwich, block_vector, dot, times
 
-STATES = 6
-"""Size of a block. Known to the compiler, it makes the products of small matrices three times as fast."""
 SOURCES = 2
 FORGIVENESS = 8
 """A used reading makes good so many rejected ones: a filter that goes astray still finds something to agree with."""
@@ -166,65 +155,9 @@ class Filtered:
 
 
 @numba.njit(cache=True, nogil=True)
-def _sandwich_one(a, c, x, row, column, half, out):  # type: ignore[no-untyped-def]
-    for i in range(STATES):
-        for j in range(STATES):
-            total = 0.0
-            for k in range(STATES):
-                total += a[i, k] * x[row + k, column + j]
-            half[i, j] = total
-    for i in range(STATES):
-        for j in range(STATES):
-            total = 0.0
-            for k in range(STATES):
-                total += half[i, k] * c[j, k]
-            out[row + i, column + j] = total
-            out[column + j, row + i] = total
-
-
-@numba.njit(cache=True, nogil=True)
-def _block_sandwich(a, x, half, out):  # type: ignore[no-untyped-def]
-    """Write A x Aᵀ for symmetric x and a block diagonal A."""
-    for b in range(a.shape[0]):
-        for c in range(b + 1):
-            _sandwich_one(a[b], a[c], x, b * STATES, c * STATES, half, out)
-
-
-@numba.njit(cache=True, nogil=True)
-def _block_vector(a, x, out):  # type: ignore[no-untyped-def]
-    for b in range(a.shape[0]):
-        for i in range(STATES):
-            total = 0.0
-            for k in range(STATES):
-                total += a[b, i, k] * x[b * STATES + k]
-            out[b * STATES + i] = total
-
-
-@numba.njit(cache=True, nogil=True)
-def _dot(x, y):  # type: ignore[no-untyped-def]
-    total = 0.0
-    for i in range(x.size):
-        total += x[i] * y[i]
-    return total
-
-
-@numba.njit(cache=True, nogil=True)
-def _times(p, h, out):  # type: ignore[no-untyped-def]
-    """Write p h for symmetric p and return hᵀ p h."""
-    size = h.size
-    for i in range(size):
-        out[i] = 0.0
-    for k in range(size):
-        w = h[k]
-        for i in range(size):
-            out[i] += w * p[k, i]
-    return _dot(h, out)
-
-
-@numba.njit(cache=True, nogil=True)
 def _move(a, q, agitation, m, p, half, m_out, p_out):  # type: ignore[no-untyped-def]
-    _block_vector(a, m, m_out)
-    _block_sandwich(a, p, half, p_out)
+    block_vector(a, m, m_out)
+    block_sandwich(a, p, half, p_out)
     for b in range(a.shape[0]):
         for i in range(STATES):
             for j in range(STATES):
@@ -276,8 +209,8 @@ def _filter(a, q, model, agitation, places, source, h, value, variance, gate_var
         since += missed > 0
         while j < places.size and places[j] == k:
             if allowed[j]:
-                seen = _times(p, h[j], gain[j])
-                nu[j] = value[j] - _dot(h[j], m)
+                seen = times(p, h[j], gain[j])
+                nu[j] = value[j] - dot(h[j], m)
                 spread[j] = seen + variance[j]
                 used[j] = nu[j] ** 2 <= width**2 * (seen + gate_variance[j])
                 distance = nu[j] ** 2 / spread[j] if used[j] else width**2
@@ -333,122 +266,3 @@ def forward(
         sinces, used, nu, spread, gain,
     )  # fmt: skip
     return Filtered(means, covs, misses, sinces, lost, used, nu, spread, gain, float(loglik))
-
-
-@dataclass(frozen=True, eq=False)
-class Smoothed:
-    """Result of the backward pass.
-
-    Attributes
-    ----------
-    mean, sigma : float64 arrays, shape (bin, wanted)
-        Of the wanted parts of the state, by all readings.
-    distance : float64 array, shape (reading,)
-        How many standard deviations each reading lies from what all *others* say of it.
-    """
-
-    mean: FloatArray
-    sigma: FloatArray
-    distance: FloatArray
-
-
-@numba.njit(cache=True, nogil=True)
-def _unobserve(h, innovation, spread, gain, nk, r, n):  # type: ignore[no-untyped-def]
-    """Take one used reading into r and N; return its e and D."""
-    knk = _times(n, gain, nk)
-    e = innovation / spread - _dot(gain, r)
-    d = 1 / spread + knk
-    size = r.size
-    for i in range(size):
-        r[i] += h[i] * e
-        for j in range(size):
-            n[i, j] += h[i] * h[j] * d - h[i] * nk[j] - nk[i] * h[j]
-    return e, d
-
-
-@numba.njit(cache=True, nogil=True)
-def _far(h, value, variance, m, p, r, n, ph, nph):  # type: ignore[no-untyped-def]
-    """How many standard deviations an unused reading lies from the smoothed state."""
-    before = _times(p, h, ph)
-    spread = max(before - _times(n, ph, nph), 0.0) + variance
-    return abs(value - _dot(h, m) - _dot(ph, r)) / np.sqrt(spread)
-
-
-@numba.njit(cache=True, nogil=True)
-def _smooth(at, model, places, h, value, variance, gate_variance, used, nu, spread, gain, means, covs, want, mean, sigma, off):  # type: ignore  # fmt: skip
-    size = means.shape[1]
-    r, r_before, n, n_before = np.zeros(size), np.zeros(size), np.zeros((size, size)), np.zeros((size, size))
-    half, one, two = np.empty((STATES, STATES)), np.empty(size), np.empty(size)
-    j = places.size - 1
-    for k in range(means.shape[0] - 1, -1, -1):
-        _block_vector(at[model[k]], r, r_before)
-        _block_sandwich(at[model[k]], n, half, n_before)
-        r[:], n[:] = r_before, n_before
-        last = j
-        while j >= 0 and places[j] == k:
-            if used[j]:
-                e, d = _unobserve(h[j], nu[j], spread[j], gain[j], one, r, n)
-                off[j] = abs(e / d) / np.sqrt(1 / d + gate_variance[j] - variance[j])
-            j -= 1
-        for i in range(j + 1, last + 1):
-            if not used[i]:
-                off[i] = _far(h[i], value[i], gate_variance[i], means[k], covs[k], r, n, one, two)
-        for i in range(want.size):
-            w = want[i]
-            mean[k, i] = means[k, w] + _dot(covs[k, w], r)
-            sigma[k, i] = np.sqrt(max(covs[k, w, w] - _times(n, covs[k, w], one), 0.0))
-
-
-def backward(moves: Moves, readings: Readings, filtered: Filtered, *, wanted: IntArray) -> Smoothed:
-    """Smooth what was filtered.
-
-    Parameters
-    ----------
-    moves, readings, filtered
-        What went into `forward`, and what came out.
-    wanted : int64 array, shape (wanted,)
-        Which parts of the state are asked for.
-
-    Returns
-    -------
-    Smoothed
-    """
-    shape = (moves.model.size, wanted.size)
-    mean, sigma, distance = np.empty(shape), np.empty(shape), np.empty(readings.value.size)
-    _smooth(
-        np.ascontiguousarray(moves.a.swapaxes(-1, -2)), moves.model, readings.bin, readings.h, readings.value,
-        readings.variance, readings.gate_variance, filtered.used, filtered.innovation, filtered.spread, filtered.gain,
-        filtered.mean, filtered.covariance, wanted, mean, sigma, distance,
-    )  # fmt: skip
-    return Smoothed(mean, sigma, distance)
-
-
-def smooth_reference(
-    moves: Moves, readings: Readings, begin: FilterState, *, wanted: IntArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return mean and standard error of the wanted parts of the state by Kalman, Rauch, Tung and Striebel.
-
-    All readings are used. For parameters see `forward` and `backward`.
-    """
-    m, p = begin.mean, begin.covariance
-    predicted, filtered = [], []
-    whole = [(linalg.block_diag(*a), linalg.block_diag(*q)) for a, q in zip(moves.a, moves.q, strict=True)]
-    for k, model in enumerate(moves.model):
-        predicted.append((m, p))
-        here = readings.bin == k
-        h = readings.h[here]
-        gain = p @ h.T @ np.linalg.inv(h @ p @ h.T + np.diag(readings.variance[here]))
-        m, p = m + gain @ (readings.value[here] - h @ m), p - gain @ h @ p
-        filtered.append((m, p))
-        a, q = whole[model]
-        m, p = a @ m, a @ p @ a.T + moves.agitation[k] * q
-    m, p = filtered[-1]
-    smoothed = [(m, p)]
-    for k in range(moves.model.size - 2, -1, -1):
-        a = whole[moves.model[k]][0]
-        gain = filtered[k][1] @ a.T @ np.linalg.inv(predicted[k + 1][1])
-        m = filtered[k][0] + gain @ (m - predicted[k + 1][0])
-        p = filtered[k][1] + gain @ (p - predicted[k + 1][1]) @ gain.T
-        smoothed.append((m, p))
-    means, covariances = (np.array(values) for values in zip(*smoothed[::-1], strict=True))
-    return means[:, wanted], np.sqrt(covariances[:, wanted, wanted])

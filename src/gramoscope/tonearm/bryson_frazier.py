@@ -1,0 +1,144 @@
+"""The smoother of Bryson and Frazier: what a forward pass found, seen again from the end.
+
+As modified by Bierman (*Fixed interval smoothing with discrete measurements*, Int. J. Control 18, 1973): with L = 1 − Khᵀ,
+
+    r ← h ν/S + Lᵀ r,      N ← h hᵀ/S + Lᵀ N L      at a reading,
+    r ← Aᵀ r,              N ← Aᵀ N A               from bin to bin,
+    x = m + P r,           C = P − P N P            for m, P predicted at the bin.
+
+It inverts nothing but scalars, so bins without readings, starts of which nothing is known and nearly singular covariances
+are no trouble to it. What all *other* readings say of one of them falls out on the way: with e = ν/S − K·r and
+D = 1/S + KᵀNK the residual against them is e/D, and 1/D its variance (de Jong, *A cross-validation filter for time series
+models*, Biometrika 75, 1988). `smooth_reference` does the same in NumPy, the way of the textbooks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from scipy import linalg
+
+from gramoscope.conventions import FloatArray, IntArray
+from gramoscope.tonearm.linear_gaussian import Filtered, FilterState, Moves, Readings
+from gramoscope.tonearm.small_matrices import STATES, block_sandwich, block_vector, dot, times
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothed:
+    """Result of the backward pass.
+
+    Attributes
+    ----------
+    mean, sigma : float64 arrays, shape (bin, wanted)
+        Of the wanted parts of the state, by all readings.
+    distance : float64 array, shape (reading,)
+        How many standard deviations each reading lies from what all *others* say of it.
+    """
+
+    mean: FloatArray
+    sigma: FloatArray
+    distance: FloatArray
+
+
+@numba.njit(cache=True, nogil=True)
+def _unobserve(h, innovation, spread, gain, nk, r, n):  # type: ignore[no-untyped-def]
+    """Take one used reading into r and N; return its e and D."""
+    knk = times(n, gain, nk)
+    e = innovation / spread - dot(gain, r)
+    d = 1 / spread + knk
+    size = r.size
+    for i in range(size):
+        r[i] += h[i] * e
+        for j in range(size):
+            n[i, j] += h[i] * h[j] * d - h[i] * nk[j] - nk[i] * h[j]
+    return e, d
+
+
+@numba.njit(cache=True, nogil=True)
+def _far(h, value, variance, m, p, r, n, ph, nph):  # type: ignore[no-untyped-def]
+    """How many standard deviations an unused reading lies from the smoothed state."""
+    before = times(p, h, ph)
+    spread = max(before - times(n, ph, nph), 0.0) + variance
+    return abs(value - dot(h, m) - dot(ph, r)) / np.sqrt(spread)
+
+
+@numba.njit(cache=True, nogil=True)
+def _smooth(at, model, places, h, value, variance, gate_variance, used, nu, spread, gain, means, covs, want, mean, sigma, off):  # type: ignore  # fmt: skip
+    size = means.shape[1]
+    r, r_before, n, n_before = np.zeros(size), np.zeros(size), np.zeros((size, size)), np.zeros((size, size))
+    half, one, two = np.empty((STATES, STATES)), np.empty(size), np.empty(size)
+    j = places.size - 1
+    for k in range(means.shape[0] - 1, -1, -1):
+        block_vector(at[model[k]], r, r_before)
+        block_sandwich(at[model[k]], n, half, n_before)
+        r[:], n[:] = r_before, n_before
+        last = j
+        while j >= 0 and places[j] == k:
+            if used[j]:
+                e, d = _unobserve(h[j], nu[j], spread[j], gain[j], one, r, n)
+                off[j] = abs(e / d) / np.sqrt(1 / d + gate_variance[j] - variance[j])
+            j -= 1
+        for i in range(j + 1, last + 1):
+            if not used[i]:
+                off[i] = _far(h[i], value[i], gate_variance[i], means[k], covs[k], r, n, one, two)
+        for i in range(want.size):
+            w = want[i]
+            mean[k, i] = means[k, w] + dot(covs[k, w], r)
+            sigma[k, i] = np.sqrt(max(covs[k, w, w] - times(n, covs[k, w], one), 0.0))
+
+
+def backward(moves: Moves, readings: Readings, filtered: Filtered, *, wanted: IntArray) -> Smoothed:
+    """Smooth what was filtered.
+
+    Parameters
+    ----------
+    moves, readings, filtered
+        What went into `forward`, and what came out.
+    wanted : int64 array, shape (wanted,)
+        Which parts of the state are asked for.
+
+    Returns
+    -------
+    Smoothed
+    """
+    shape = (moves.model.size, wanted.size)
+    mean, sigma, distance = np.empty(shape), np.empty(shape), np.empty(readings.value.size)
+    _smooth(
+        np.ascontiguousarray(moves.a.swapaxes(-1, -2)), moves.model, readings.bin, readings.h, readings.value,
+        readings.variance, readings.gate_variance, filtered.used, filtered.innovation, filtered.spread, filtered.gain,
+        filtered.mean, filtered.covariance, wanted, mean, sigma, distance,
+    )  # fmt: skip
+    return Smoothed(mean, sigma, distance)
+
+
+def smooth_reference(
+    moves: Moves, readings: Readings, begin: FilterState, *, wanted: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return mean and standard error of the wanted parts of the state by Kalman, Rauch, Tung and Striebel.
+
+    All readings are used. For parameters see `forward` and `backward`.
+    """
+    m, p = begin.mean, begin.covariance
+    predicted, filtered = [], []
+    whole = [(linalg.block_diag(*a), linalg.block_diag(*q)) for a, q in zip(moves.a, moves.q, strict=True)]
+    for k, model in enumerate(moves.model):
+        predicted.append((m, p))
+        here = readings.bin == k
+        h = readings.h[here]
+        gain = p @ h.T @ np.linalg.inv(h @ p @ h.T + np.diag(readings.variance[here]))
+        m, p = m + gain @ (readings.value[here] - h @ m), p - gain @ h @ p
+        filtered.append((m, p))
+        a, q = whole[model]
+        m, p = a @ m, a @ p @ a.T + moves.agitation[k] * q
+    m, p = filtered[-1]
+    smoothed = [(m, p)]
+    for k in range(moves.model.size - 2, -1, -1):
+        a = whole[moves.model[k]][0]
+        gain = filtered[k][1] @ a.T @ np.linalg.inv(predicted[k + 1][1])
+        m = filtered[k][0] + gain @ (m - predicted[k + 1][0])
+        p = filtered[k][1] + gain @ (p - predicted[k + 1][1]) @ gain.T
+        smoothed.append((m, p))
+    means, covariances = (np.array(values) for values in zip(*smoothed[::-1], strict=True))
+    return means[:, wanted], np.sqrt(covariances[:, wanted, wanted])
