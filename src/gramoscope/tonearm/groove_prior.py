@@ -58,15 +58,12 @@ class GroovePrior:
         (`tonearm.level`); about one.
     floor : float
         How much it bends at the least.
-    noise : float
-        How many times as large as they claim the errors of the readings are.
     """
 
     corner_per_m: float
     cutoff_per_m: float
     share: float = 1.0
     floor: float = 0.0
-    noise: float = 1.0
 
     def bends(self, level: float) -> float:
         """Return how much the groove is believed to bend at a level, a change of slope over `BEND_M`."""

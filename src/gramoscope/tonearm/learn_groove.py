@@ -9,7 +9,7 @@ learned but given (`tonearm.level`).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,14 +22,12 @@ from gramoscope.tonearm.linear_gaussian import Gate, Moves, Readings, blank, for
 
 GATE = 4.0
 """Samples further than this many standard errors from their prediction count as if they lay right there."""
-DRIFT = np.array([0.7, 0.35, 0.35, 0.1])
-"""How much λ, μ, the share and the noise are expected to change from one learning to the next, e-folds."""
+DRIFT = np.array([0.7, 0.35, 0.35])
+"""How much λ, μ and the share are expected to change from one learning to the next, e-folds."""
 SHARES = (0.3, 10.0)
 """Least and largest bend, for each unit of the level."""
 SLOPE_SIGMA = 0.05
 """By how much the rms of the slopes may be off, e-folds: firm, for the likelihood has thousands of samples to argue with."""
-NOISES = (0.5, 3.0)
-"""Least and largest error of the readings, for each unit of what they claim."""
 ANYWHERE_M = 1e-4
 """How little is known of the place at which a stretch begins, once its first sample is taken off."""
 
@@ -52,13 +50,13 @@ class PriorLimits:
 
     @property
     def logarithms(self) -> FloatArray:
-        """Of least and largest, shape (4, 2)."""
-        return np.log([self.corner_per_m, self.cutoff_per_m, SHARES, NOISES])
+        """Of least and largest, shape (3, 2)."""
+        return np.log([self.corner_per_m, self.cutoff_per_m, SHARES])
 
     @property
     def middle(self) -> GroovePrior:
         """What is believed when nothing can be learned."""
-        return _prior(np.array([*self.logarithms[:2].mean(axis=1), 0.0, 0.0]), self)
+        return _prior(np.array([*self.logarithms[:2].mean(axis=1), 0.0]), self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +96,7 @@ def learn(
     Returns
     -------
     GroovePrior
-        By bounded Nelder–Mead over the logarithms of λ, μ, share and noise; `before`, or the middle of the limits, when there
+        By bounded Nelder–Mead over the logarithms of λ, μ and share; `before`, or the middle of the limits, when there
         are no lessons.
     """
     if not lessons:
@@ -106,11 +104,11 @@ def learn(
     known, first, step = (
         _logarithms(before or limits.middle),
         _logarithms(limits.middle),
-        np.array([1.0, -0.7, 0.4, 0.2]),
+        np.array([1.0, -0.7, 0.4]),
     )
 
     def cost(logarithms: FloatArray) -> float:
-        change = (logarithms - known) / DRIFT if before else np.zeros(4)
+        change = (logarithms - known) / DRIFT if before else np.zeros(3)
         prior = _prior(logarithms, limits)
         disbelief = 0.5 * float(change @ change) + 0.5 * _louder(lessons, step_m, prior) ** 2
         return disbelief - _log_likelihood(lessons, step_m, prior)
@@ -141,7 +139,7 @@ def _least(
     inside = np.clip(first, *bounds.T)
     there = inside + step
     step = np.where((there < bounds[:, 0]) | (there > bounds[:, 1]), -step, step)
-    simplex = inside + np.vstack([np.zeros(4), np.diag(step)])
+    simplex = inside + np.vstack([np.zeros(3), np.diag(step)])
     options: Any = {"xatol": 0.1, "fatol": 0.3, "maxfev": looks, "initial_simplex": np.clip(simplex, *bounds.T)}
     found = optimize.minimize(cost, inside, method="Nelder-Mead", bounds=optimize.Bounds(*bounds.T), options=options)
     return np.asarray(found.x)
@@ -156,16 +154,14 @@ def _log_likelihood(lessons: Sequence[Lesson], step_m: float, prior: GroovePrior
         bins = int(one.readings.bin[-1]) + 1
         moves = Moves(a[None, None], sigma**2 * q[None, None], np.zeros(bins, np.int64), np.ones(bins))
         covariance = start(at_rest, sigma, place_sigma_m=ANYWHERE_M)
-        variance = prior.noise**2 * one.readings.variance
-        readings = replace(one.readings, variance=variance, gate_variance=variance)
-        total += forward(moves, readings, blank(covariance), gate=Gate(GATE)).log_likelihood
+        total += forward(moves, one.readings, blank(covariance), gate=Gate(GATE)).log_likelihood
     return total
 
 
 def _logarithms(prior: GroovePrior) -> FloatArray:
-    return np.log([prior.corner_per_m, prior.cutoff_per_m, prior.share, prior.noise])
+    return np.log([prior.corner_per_m, prior.cutoff_per_m, prior.share])
 
 
 def _prior(logarithms: FloatArray, limits: PriorLimits) -> GroovePrior:
-    corner, cutoff, share, noise = np.exp(np.clip(logarithms, *limits.logarithms.T))
-    return GroovePrior(float(corner), float(cutoff), float(share), limits.floor, float(noise))
+    corner, cutoff, share = np.exp(np.clip(logarithms, *limits.logarithms.T))
+    return GroovePrior(float(corner), float(cutoff), float(share), limits.floor)

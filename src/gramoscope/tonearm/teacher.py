@@ -15,7 +15,16 @@ from gramoscope.tonearm.course import Course
 from gramoscope.tonearm.groove_model import Beliefs, GrooveModel, agitation, beginning, beliefs, moves, robustly
 from gramoscope.tonearm.groove_prior import GroovePrior
 from gramoscope.tonearm.learn_groove import PriorLimits, learn, lesson
-from gramoscope.tonearm.level import OneDirection, Walls, bend_power, calmed, levels, one_direction, trusted
+from gramoscope.tonearm.level import (
+    OneDirection,
+    Walls,
+    bend_power,
+    calmed,
+    claim_error,
+    levels,
+    one_direction,
+    trusted,
+)
 from gramoscope.tonearm.place_samples import samples_of
 from gramoscope.tonearm.stretches import Stretch
 
@@ -62,11 +71,10 @@ class Teacher:
         before: Priors | None = None
         levelled = self._levelled(stretches)
         while batch := list(islice(levelled, self.teaching.groups)):
-            before = self._learn(batch, before)
+            before, error = self._learn(batch, before)
             believed = beliefs(before, self.step_m)
-            noise = before[DIRECTIONS.index(self.course.direction)].noise
             for claimed, level in batch:
-                stretch = replace(claimed, variance=noise**2 * claimed.variance)
+                stretch = _put_right(claimed, error)
                 model = self._model(believed, stretch, level)
                 yield stretch, replace(model, agitation=self._agitation(model, stretch))
 
@@ -92,12 +100,15 @@ class Teacher:
         seen = (self._seen(calmed(stretch), name) for name in DIRECTIONS)
         return np.array([bend_power(one, self.step_m) for one in seen])
 
-    def _learn(self, batch: Sequence[Levelled], before: Priors | None) -> Priors:
+    def _learn(self, batch: Sequence[Levelled], before: Priors | None) -> tuple[Priors, float]:
+        """Return what to believe of both directions, and how many times as large as claimed the errors are."""
         limits = [self._limits(name, float(batch[0][0].arc_m[0])) for name in DIRECTIONS]
         count = min(FIRST_TEACHERS if before is None else TEACHERS, len(batch))
         chosen = [batch[i] for i in np.linspace(0, len(batch) - 1, count).round().astype(int)]
         believed = beliefs(before or (limits[0].middle, limits[1].middle), self.step_m)
-        teachers = [(self._cleaned(believed, stretch, level), level) for stretch, level in chosen]
+        cleaned = [(self._cleaned(believed, stretch, level), level) for stretch, level in chosen]
+        error = claim_error(trusted(stretch) for stretch, _ in cleaned)
+        teachers = [(_put_right(stretch, error), level) for stretch, level in cleaned]
         lateral, vertical = (
             learn(
                 [
@@ -113,7 +124,7 @@ class Teacher:
             )
             for i, name in enumerate(DIRECTIONS)
         )
-        return lateral, vertical
+        return (lateral, vertical), error
 
     def _cleaned(self, believed: Beliefs, stretch: Stretch, level: FloatArray) -> Stretch:
         """The stretch with all those samples suspect that the others contradict, by what was believed so far."""
@@ -140,3 +151,8 @@ class Teacher:
         (low, high), (lowest, highest) = self.teaching.corner_limits_hz, self.teaching.cutoff_limits_hz
         per_hz = 2 * np.pi / speed
         return PriorLimits(floor / speed, (per_hz * low, per_hz * high), (per_hz * lowest, per_hz * highest))
+
+
+def _put_right(stretch: Stretch, error: float) -> Stretch:
+    """The stretch with errors that are so many times as large as it claims."""
+    return replace(stretch, variance=error**2 * stretch.variance)
