@@ -65,6 +65,11 @@ def _group(scene: Scene, passage: Passage, number: int) -> FrameGroup:
 
 
 @pytest.fixture(scope="session")
+def film_group() -> Callable[[Scene, Passage, int], FrameGroup]:
+    return _group
+
+
+@pytest.fixture(scope="session")
 def filmed() -> Callable[..., Take]:
     return take
 

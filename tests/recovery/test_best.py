@@ -5,6 +5,7 @@ Twenty groups of four frames: nine millimetres of groove, a hundredth of a secon
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +20,7 @@ from gramoscope.player.workers import spreading
 from gramoscope.quality import Quality
 from gramoscope.signal_path import FrameGroup, WallTrace
 from gramoscope.simulation.passage import Passage
-from gramoscope.simulation.render import cut_passage, filmed_group, render_group
+from gramoscope.simulation.render import cut_passage
 from gramoscope.simulation.scene import Scene, filming_bench
 from gramoscope.tonearm.follow import Tonearm
 
@@ -67,22 +68,8 @@ class Heard:
         return float(10 * np.log10(np.mean(true[where] ** 2) / np.mean(error[where] ** 2)))
 
 
-def _group(scene: Scene, passage: Passage, number: int) -> FrameGroup:
-    filmed, sensor = filmed_group(scene, number), scene.bench.sensor
-    frames = filmed.arc_start_m.size
-    return FrameGroup(
-        number=number,
-        images=render_group(scene, passage, number),
-        arc_start_m=filmed.nominal_start_m,
-        stage_m=np.full(frames, filmed.stage_m),
-        pixel_pitch_m=sensor.pixel_pitch_m,
-        white_level=sensor.white_level,
-        valid=np.ones(frames, bool),
-    )
-
-
 @pytest.fixture(scope="module")
-def film() -> Film:
+def film(film_group: Callable[[Scene, Passage, int], FrameGroup]) -> Film:
     """Noise like music, louder in the bass than in the treble, at the level of an ordinary 78."""
     sequence = Sequence(groups=GROUPS, frames_per_group=4, frame_step_m=0.8e-6, group_step_m=470e-6)
     scene = Scene(replace(filming_bench(height_px=448), sequence=sequence), groove_middle_m=-1.7e-6, seed=11)
@@ -90,7 +77,7 @@ def film() -> Film:
     sound = sosfiltfilt(sos, np.random.default_rng(42).normal(size=1200))
     passage = cut_passage(np.asarray(sound), rate_hz=RATE_HZ, scene=scene)
     with spreading(2) as spread:
-        groups = list(spread(lambda number: _group(scene, passage, number), range(GROUPS)))
+        groups = list(spread(lambda number: film_group(scene, passage, number), range(GROUPS)))
     return Film(scene, passage, groups)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
-from gramoscope.conventions import BoolArray, FloatArray, IntArray
+from gramoscope.conventions import BoolArray, FloatArray
 from gramoscope.signal_path import FrameGroup, ImageArray, WallTrace
 
 In = TypeVar("In")
@@ -69,10 +69,6 @@ class Pickup(Protocol):
 
 class Cartridge(Protocol):
     """A way of reading, fitted to an apparatus."""
-
-    def learning_groups(self, group_count: int) -> IntArray:
-        """Return which groups of a passage it wants to learn from, in rising order; none for one that learns nothing."""
-        ...
 
     def learn(
         self,

@@ -14,6 +14,7 @@ carry texture.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -22,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gramoscope.conventions import FloatArray
-from gramoscope.signal_path import FrameGroup, ImageArray
+from gramoscope.signal_path import FrameGroup, ImageArray, Texture
 
 Float32Array = npt.NDArray[np.float32]
 
@@ -299,3 +300,49 @@ def frame_shifts(group: FrameGroup) -> tuple[FloatArray, FloatArray]:
         if b == a + 1:
             step_m[a] = found * group.pixel_pitch_m
     return shift, step_m
+
+
+def registered(group: FrameGroup) -> tuple[Canvas, FloatArray]:
+    """Return the valid frames of a group laid over each other, and the steps between frames (see `frame_shifts`)."""
+    shift_px, step_m = frame_shifts(group)
+    index = np.flatnonzero(group.valid)
+    images = group.images if index.size == group.images.shape[0] else group.images[index]
+    return register(images, shift_px, index), step_m
+
+
+def overlap_textures(
+    canvas: Canvas,
+    group: FrameGroup,
+    *,
+    group_step_m: float,
+    texture_of: Callable[[slice], Float32Array],
+    reach_px: int = 40,
+) -> tuple[Texture | None, Texture | None]:
+    """Return the strips at both ends of a stretch by which it is matched with its neighbours.
+
+    Parameters
+    ----------
+    canvas : Canvas
+    group : FrameGroup
+    group_step_m : float
+        From stretch to stretch, nominal.
+    texture_of : callable
+        Gives the texture, shape (row, column), of some columns of the canvas.
+    reach_px : int
+        How far the strips reach beyond the nominal overlap.
+
+    Returns
+    -------
+    head, tail : Texture or None
+        None where stretches do not overlap.
+    """
+    first = int(canvas.frame_index[0])
+    pitch = group.pixel_pitch_m
+    width = canvas.mean.shape[1]
+    overlap = width - round(group_step_m / pitch)
+    if overlap <= 0:
+        return None, None
+    length = min(overlap + reach_px, width)
+    start, stage = float(group.arc_start_m[first]), float(group.stage_m[first])
+    head, tail = texture_of(slice(0, length)), texture_of(slice(width - length, width))
+    return Texture(head, start, pitch, stage), Texture(tail, start + (width - length) * pitch, pitch, stage)

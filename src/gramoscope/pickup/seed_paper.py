@@ -22,18 +22,16 @@ from gramoscope.pickup.centreline import Centreline, centroids, discard_damaged_
 from gramoscope.pickup.flow.derivatives import Derivatives, group_derivatives, texture_contrast
 from gramoscope.pickup.flow.horn_schunck import Flow, FlowMethod, GrooveHornSchunck
 from gramoscope.pickup.in_focus import InFocus
-from gramoscope.pickup.registration import Canvas, frame_shifts, register
+from gramoscope.pickup.registration import Canvas, overlap_textures, registered
 from gramoscope.pickup.search import HoughSearch, Segment, line_rows, line_slopes
 from gramoscope.pickup.stripes import StripeModel, kept_stripes, walls_read
 from gramoscope.pickup.wall import Planes, WallOrientation, wall_angle_rad
 from gramoscope.pickup.wall_samples import WallSamples, samples_of_wall
 from gramoscope.quality import Quality, no_flags
-from gramoscope.signal_path import FrameGroup, Texture, WallTrace
+from gramoscope.signal_path import FrameGroup, WallTrace
 
 NEARLY_WHITE = 0.97
 """Points brighter than this share of full scale are burnt out: their texture is the camera's."""
-TEXTURE_REACH_PX = 40
-"""How far, beyond the nominal overlap, the strips reach that neighbouring stretches are matched by."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,10 +122,6 @@ class SeedPaperPickup:
             return self._lost(group, exposure_flags)
         return self._read(group, exposure_flags).trace
 
-    def learning_groups(self, group_count: int) -> IntArray:
-        """Return none: the paper's reading knows beforehand what it looks for."""
-        return np.empty(0, np.int64)
-
     def learn(
         self,
         group: Callable[[int], FrameGroup],
@@ -164,14 +158,11 @@ class SeedPaperPickup:
         return self._read(group, exposure_flags) if group.valid.any() else None
 
     def _read(self, group: FrameGroup, exposure_flags: Quality) -> Reading:
-        shift_px, step_m = frame_shifts(group)
-        index = np.flatnonzero(group.valid)
-        images = group.images if index.size == group.images.shape[0] else group.images[index]
-        canvas = register(images, shift_px, index)
+        canvas, step_m = registered(group)
         raw = group_derivatives(canvas, smoothing_px=self.smoothing_px)
         contrast = texture_contrast(raw.x)
         derivatives = raw.scaled(1 / contrast if contrast > 0 else 0.0)
-        flow = self._flow(derivatives, step_m) if index.size > 1 else None
+        flow = self._flow(derivatives, step_m) if canvas.frame_index.size > 1 else None
         in_focus = self.in_focus.mask(derivatives, flow) & (canvas.mean < NEARLY_WHITE * group.white_level)
         rows, columns = np.nonzero(in_focus)
         stripes = self.bench.stripes()
@@ -188,7 +179,12 @@ class SeedPaperPickup:
             lines.append(fill_voids(row, line_rows(segments, number)))
         kept = kept_stripes(stripes)
         planes, samples = self._orient(stripes, lines, segments)
-        head, tail = self._textures(group, canvas, derivatives)
+        head, tail = overlap_textures(
+            canvas,
+            group,
+            group_step_m=self.bench.sequence.group_step_m,
+            texture_of=lambda columns: derivatives.x[:, columns].copy(),
+        )
         trace = replace(self._trace(group, samples, exposure_flags, step_m), head=head, tail=tail)
         return Reading(
             group,
@@ -282,22 +278,6 @@ class SeedPaperPickup:
             wall_angle_rad=angle,
             frame_step_m=step_m,
             problems=group.problems,
-        )
-
-    def _textures(
-        self, group: FrameGroup, canvas: Canvas, derivatives: Derivatives
-    ) -> tuple[Texture | None, Texture | None]:
-        first = int(canvas.frame_index[0])
-        pitch = group.pixel_pitch_m
-        width = canvas.mean.shape[1]
-        overlap = width - round(self.bench.sequence.group_step_m / pitch)
-        if overlap <= 0:
-            return None, None
-        length = min(overlap + TEXTURE_REACH_PX, width)
-        start, stage = float(group.arc_start_m[first]), float(group.stage_m[first])
-        return (
-            Texture(derivatives.x[:, :length].copy(), start, pitch, stage),
-            Texture(derivatives.x[:, width - length :].copy(), start + (width - length) * pitch, pitch, stage),
         )
 
     def _lost(self, group: FrameGroup, flags: Quality) -> WallTrace:

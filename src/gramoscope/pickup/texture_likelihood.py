@@ -20,7 +20,7 @@ from gramoscope.camera.exposure import Exposure
 from gramoscope.conventions import INNER, OUTER, FloatArray, IntArray
 from gramoscope.errors import require
 from gramoscope.pickup.cartridge import Line, Sketch, Spread
-from gramoscope.pickup.registration import Canvas, frame_shifts, register
+from gramoscope.pickup.registration import Canvas, overlap_textures, registered
 from gramoscope.pickup.texture.calibration import aligned_layout, calibration_of
 from gramoscope.pickup.texture.groove_search import GrooveSearch
 from gramoscope.pickup.texture.layout import StripeLayout
@@ -28,7 +28,7 @@ from gramoscope.pickup.texture.learning import Learning, Lesson
 from gramoscope.pickup.texture.reading import Evidence, Rules, Stretch, read, settled
 from gramoscope.pickup.texture.sharpness import CELL_PX, sharpness
 from gramoscope.quality import Quality, no_flags
-from gramoscope.signal_path import FrameGroup, Texture, WallTrace
+from gramoscope.signal_path import FrameGroup, WallTrace
 
 STRIDE_PX = 8
 """Columns whose evidence makes one sample."""
@@ -36,8 +36,6 @@ NEARLY_WHITE = 0.97
 """Points brighter than this share of full scale are burnt out."""
 SEARCH_MARGIN_PX = -16.0
 """The coarse search looks for stripes so far beyond the glass edge: in the mixed zone they are faint, but there."""
-TEXTURE_REACH_PX = 40
-"""How far, beyond the nominal overlap, the strips reach that neighbouring stretches are matched by."""
 SURPRISE_LIMITS = (0.7, 9.0)
 """A stretch whose scores are weaker or stronger than what was learned has its error bars changed by the root of it."""
 
@@ -173,7 +171,12 @@ class TexturePickup:
             return self._lost(group, exposure_flags, (*group.problems, f"group {group.number} is not read: {UNTAUGHT}"))
         canvas, step_m = registered(group)
         stretch, found = self._read(canvas, group)
-        head, tail = self._textures(group, canvas)
+        head, tail = overlap_textures(
+            canvas,
+            group,
+            group_step_m=self.cartridge.bench.sequence.group_step_m,
+            texture_of=lambda columns: ndimage.gaussian_filter(canvas.mean[:, columns], 1.0, order=(0, 1)),
+        )
         return replace(self._trace(group, stretch, found, exposure_flags, step_m), head=head, tail=tail)
 
     @property
@@ -248,22 +251,6 @@ class TexturePickup:
             problems=group.problems,
         )
 
-    def _textures(self, group: FrameGroup, canvas: Canvas) -> tuple[Texture | None, Texture | None]:
-        first = int(canvas.frame_index[0])
-        pitch = group.pixel_pitch_m
-        width = canvas.mean.shape[1]
-        overlap = width - round(self.cartridge.bench.sequence.group_step_m / pitch)
-        if overlap <= 0:
-            return None, None
-        length = min(overlap + TEXTURE_REACH_PX, width)
-        start, stage = float(group.arc_start_m[first]), float(group.stage_m[first])
-        head = ndimage.gaussian_filter(canvas.mean[:, :length], 1.0, order=(0, 1))
-        tail = ndimage.gaussian_filter(canvas.mean[:, width - length :], 1.0, order=(0, 1))
-        return (
-            Texture(head, start, pitch, stage),
-            Texture(tail, start + (width - length) * pitch, pitch, stage),
-        )
-
     def _lost(self, group: FrameGroup, flags: Quality, problems: tuple[str, ...]) -> WallTrace:
         """A stretch of which nothing can be said."""
         samples = group.images.shape[2] // STRIDE_PX
@@ -291,14 +278,6 @@ SUPPORT_CELLS = 4.0
 """Smoothing of the support: one cell of texture is a poor witness."""
 UNSEEN = Quality.NO_STRIPE | Quality.INTERPOLATED
 UNTAUGHT = "too little of the stripes is seen to learn their texture; the recipe seed-paper reads single groups"
-
-
-def registered(group: FrameGroup) -> tuple[Canvas, FloatArray]:
-    """Return the valid frames of a group laid over each other, and the steps between them."""
-    shift_px, step_m = frame_shifts(group)
-    index = np.flatnonzero(group.valid)
-    images = group.images if index.size == group.images.shape[0] else group.images[index]
-    return register(images, shift_px, index), step_m
 
 
 def laid_out(canvas: Canvas, white_level: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -181,5 +181,6 @@ def _require_sound(monitor: Monitor) -> None:
             f"the groove was not found in any of {monitor.groups} groups"
             + (f"; the first problem: {monitor.problems[0]}" if monitor.problems else ""),
             "sharp stripes along the groove where capture.toml says they are",
-            "look at the frames beside the rows that `gramoscope info` expects, and check [cover_glass], [disc] and rows",
+            "look at the frames beside the rows that `gramoscope info` expects, and check [cover_glass], [disc] and rows; a "
+            "film of less than eight groups can only be played with --recipe seed-paper",
         )

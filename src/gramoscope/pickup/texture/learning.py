@@ -2,9 +2,13 @@
 
 Some groups, spread over the passage, are laid ready and searched coarsely. Then rounds follow: lay windows about the present
 paths, sum up their cross-spectra, invert them, move the paths by what the new model says. The first rounds add much to the
-diagonal of C, which makes them forgiving, the last nothing. In each round the model is blurred by just the error that paths
-have in that round, so the whole series of models will lead any other stretch in the same way from the coarse path to the
-exact one.
+diagonal of C, which makes them forgiving, the last hardly anything. In each round the model is blurred by just the error that
+paths have in that round, so the whole series of models will lead any other stretch in the same way from the coarse path to
+the exact one.
+
+A model calls the path that it was learned from right, whatever that is. So the groups are dealt out to a few folds, and the
+cross-spectra that move, judge and read a group are those of the other folds; only the whitening filter, and what scores are
+like on average, are those of all.
 """
 
 from __future__ import annotations
@@ -23,13 +27,7 @@ from gramoscope.pickup.texture.following import Float32Array
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.likelihood import StripeStatistics, believable, quiet_power, scores, softened
 from gramoscope.pickup.texture.reading import Model, Rules, Stretch, clear_columns, evidence, step, windows
-from gramoscope.pickup.texture.spectrum import (
-    Band,
-    CrossSpectra,
-    cross_spectra,
-    precision,
-    whitening_filter,
-)
+from gramoscope.pickup.texture.spectrum import Band, CrossSpectra, cross_spectra, precision, whitening_filter
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,8 +229,9 @@ class Learning:
         self, stretch: Stretch, model: Model, number: int, before: StripeStatistics | None, rules: Rules
     ) -> tuple[Float32Array, Float32Array, Float32Array] | None:
         """Return window, derivative and weight of a stripe; None where too little of it can be seen."""
-        row = model.layout.rows(stretch.displacement_px)[number]
-        seen = model.layout.visible(model.layout.rows(stretch.displacement_px), half_px=self.half_px)[number]
+        rows = model.layout.rows(stretch.displacement_px)
+        row = rows[number]
+        seen = model.layout.visible(rows, half_px=self.half_px)[number]
         clear = clear_columns(stretch, number, row, seen, self.half_px, rules)
         if not clear.any():
             return None

@@ -184,7 +184,7 @@ def step(found: Evidence, cut: Cut, rules: Rules) -> FloatArray:
     common = _smoothed((sign * found.score).sum(axis=0), found.information.sum(axis=0), smooth_px, rules)
     inner, outer = found.information
     total = inner + outer
-    both = np.divide(4 * inner * outer, total, out=np.zeros_like(total), where=total > 0)
+    both = np.divide(inner * outer, total, out=np.zeros_like(total), where=total > 0)
     with np.errstate(invalid="ignore", divide="ignore"):
         each = np.where(found.information > 0, sign * found.score / found.information, 0.0)
     against = _smoothed(both * (each[OUTER] - each[INNER]) / 2, both, rules.smooth_other_px, rules)
