@@ -1,5 +1,8 @@
 import errno
 import os
+import signal
+import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -23,6 +26,27 @@ def test_an_interrupted_film_leaves_nothing(tmp_path, bench, film, layout, inter
 
     with pytest.raises(interruption):
         interrupted()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_ctrl_c_while_zarr_writes_on_threads_of_its_own_leaves_nothing(tmp_path, bench, monkeypatch):
+    ended = threading.Event()
+
+    def slow_create(root, **keywords):
+        def write():
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.2)
+            root.mkdir(parents=True)
+            ended.set()
+
+        background = threading.Thread(target=write)
+        background.start()
+        background.join()
+
+    monkeypatch.setattr("gramoscope.camera.frames_zarr.zarr.create_array", slow_create)
+    with pytest.raises(KeyboardInterrupt):
+        CaptureWriter(tmp_path / "c", bench, layout="zarr")
+    assert ended.wait(5)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -24,11 +24,12 @@ from gramoscope.camera.frames import Frame
 from gramoscope.camera.frames_image import write_png
 from gramoscope.camera.frames_tiff import write_tiff
 from gramoscope.camera.frames_video import VideoWriter
-from gramoscope.camera.frames_zarr import create_zarr
+from gramoscope.camera.frames_zarr import create_zarr, write_zarr_frames
 from gramoscope.camera.pattern import FramePattern
 from gramoscope.camera.sensor import Sensor
 from gramoscope.conventions import MICROMETRES_PER_METRE, FloatArray, mirror
 from gramoscope.errors import OutputError, require
+from gramoscope.interruption import ctrl_c_waits
 
 WrittenLayout = Literal["tiff", "png", "zarr", "video"]
 
@@ -91,7 +92,7 @@ class CaptureWriter:
         self._staging = self.folder.parent / f".{self.folder.name}.{uuid.uuid4().hex[:8]}.partial"
         self._rows: dict[int, list[tuple[str, ...]]] = {}
         self._lock = threading.Lock()
-        with self._giving_up():
+        with self._giving_up(), ctrl_c_waits():
             (self._staging / "frames").mkdir(parents=True)
             self._shelf = _shelf(self._staging, bench, layout=layout, compress=compress)
 
@@ -319,7 +320,7 @@ class _ZarrShelf:
         self._array = array
 
     def put(self, number: int, frames: Frame) -> None:
-        self._array[number * len(frames) : (number + 1) * len(frames)] = frames
+        write_zarr_frames(self._array, number * len(frames), frames)
 
     def close(self, *, whole: bool) -> None:
         """Nothing is open between groups."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import zarr
@@ -15,6 +16,8 @@ from gramoscope.camera.frames import Frame, Layout, Lost, words_of, wrong_size
 from gramoscope.camera.quiet import quiet_warnings
 from gramoscope.camera.sensor import Sensor
 from gramoscope.errors import NoFramesError
+
+Done = TypeVar("Done")
 
 _STORED_AXES = ("t", "c", "z", "y", "x")
 
@@ -168,13 +171,39 @@ def create_zarr(
         Assign frames to it, a whole group at a time.
     """
     picture = sensor.frame_shape
-    return zarr.create_array(
-        root,
-        shape=(groups * frames_per_group, *picture),
-        chunks=(1, *picture),
-        shards=(frames_per_group, *picture),
-        dtype=np.dtype(sensor.dtype).name,
-        compressors="auto" if compress else None,
-        dimension_names=("t", "y", "x", "c")[: 1 + len(picture)],
-        config={"write_empty_chunks": True},  # a black frame is not a missing one
+    return _to_its_end(
+        lambda: zarr.create_array(
+            root,
+            shape=(groups * frames_per_group, *picture),
+            chunks=(1, *picture),
+            shards=(frames_per_group, *picture),
+            dtype=np.dtype(sensor.dtype).name,
+            compressors="auto" if compress else None,
+            dimension_names=("t", "y", "x", "c")[: 1 + len(picture)],
+            config={"write_empty_chunks": True},  # a black frame is not a missing one
+        )
     )
+
+
+def write_zarr_frames(array: zarr.Array[Any], first: int, frames: Frame) -> None:
+    """Write consecutive frames; when this was interrupted, nothing is being written any more.
+
+    Parameters
+    ----------
+    array : zarr.Array
+        From `create_zarr`.
+    first : int
+        Index of the first frame, counted over all groups.
+    frames : Frame, shape (frame, *sensor.frame_shape)
+    """
+
+    def assign() -> None:
+        array[first : first + len(frames)] = frames
+
+    _to_its_end(assign)
+
+
+def _to_its_end(work: Callable[[], Done]) -> Done:
+    """Work on a thread and wait for it, Ctrl-C or not: zarr's own threads go on writing when who called them is stopped."""
+    with ThreadPoolExecutor(max_workers=1) as thread:
+        return thread.submit(work).result()

@@ -21,6 +21,7 @@ from gramoscope.cli.play import play
 from gramoscope.cli.recipe import recipe
 from gramoscope.cli.terminal import BAD_INPUT, FINE, INTERRUPTED, show_error
 from gramoscope.errors import GramoscopeError
+from gramoscope.interruption import was_ctrl_c
 
 app = cyclopts.App(
     name="gramoscope",
@@ -61,6 +62,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Exit code, see `gramoscope.cli.terminal`.
     """
     try:
+        return _told(arguments)
+    except BaseException as error:
+        if not was_ctrl_c(error):
+            raise
+        if arguments is None:
+            # libraries that were stopped half-way complain while the interpreter tidies up: nobody can use that
+            sys.unraisablehook = lambda _: None
+        sys.stderr.write("\nStopped. No half-written file was left.\n")
+        return INTERRUPTED
+
+
+def _told(arguments: Sequence[str] | None) -> int:
+    """Run a command line and tell people what went wrong, if it did."""
+    try:
         result = app(arguments if arguments is None else list(arguments), exit_on_error=False)
         sys.stdout.flush()
     except cyclopts.CycloptsError:
@@ -80,12 +95,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             GramoscopeError("there is not enough memory", "less at a time", "fewer --workers, or a lower --rate")
         )
         return BAD_INPUT
-    except KeyboardInterrupt:
-        if arguments is None:
-            # libraries that were stopped half-way complain while the interpreter tidies up: nobody can use that
-            sys.unraisablehook = lambda _: None
-        sys.stderr.write("\nStopped. No half-written file was left.\n")
-        return INTERRUPTED
     return result if isinstance(result, int) else FINE
 
 

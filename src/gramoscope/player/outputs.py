@@ -11,6 +11,7 @@ from typing import Any, Self
 from matplotlib.figure import Figure
 
 from gramoscope.errors import OutputError
+from gramoscope.interruption import ctrl_c_waits
 from gramoscope.listening.ink import save_png
 from gramoscope.listening.report import json_text
 from gramoscope.listening.wav import WavWriter
@@ -43,12 +44,14 @@ class Outputs:
         self._made: list[Path] = []
 
     def __enter__(self) -> Self:
-        self._make_folder()
         with contextlib.ExitStack() as undo:
-            undo.callback(self._remove_made)
-            self.flat = WavWriter(self.folder / FLAT, rate_hz=self._rate_hz)
-            undo.callback(self.flat.discard)
-            self.equalised = WavWriter(self.folder / EQUALISED, rate_hz=self._rate_hz)
+            with ctrl_c_waits():
+                undo.callback(self._remove_made)
+                self._make_folder()
+                self.flat = WavWriter(self.folder / FLAT, rate_hz=self._rate_hz)
+                undo.callback(self.flat.discard)
+                self.equalised = WavWriter(self.folder / EQUALISED, rate_hz=self._rate_hz)
+                undo.callback(self.equalised.discard)
             undo.pop_all()
         return self
 
@@ -57,9 +60,11 @@ class Outputs:
         text = json_text(report)
         self.flat.finish()
         self.equalised.finish()
-        with written_whole(self.folder / REPORT) as report_part, written_whole(self.folder / PICTURE) as picture_part:
+        report_whole, picture_whole = (written_whole(self.folder / name) for name in (REPORT, PICTURE))
+        with contextlib.ExitStack() as holding, report_whole as report_part, picture_whole as picture_part:
             report_part.write_text(text, encoding="utf-8")
             save_png(picture, picture_part)
+            holding.enter_context(ctrl_c_waits())
             # nothing large is left to do: from here on an old transfer makes way. Whoever sees a report sees a whole
             # transfer, so the old one goes first and the new one comes last, when the block ends
             (self.folder / REPORT).unlink(missing_ok=True)
@@ -75,7 +80,7 @@ class Outputs:
             self._remove_made()
 
     def _make_folder(self) -> None:
-        missing = [path for path in (self.folder, *self.folder.parents) if not path.exists()]
+        self._made = [path for path in (self.folder, *self.folder.parents) if not path.exists()]
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -84,7 +89,6 @@ class Outputs:
                 "a place where a folder can be made",
                 "choose another --out",
             ) from error
-        self._made = missing
 
     def _remove_made(self) -> None:
         for path in self._made:
