@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gramoscope.conventions import FloatArray
+from gramoscope.pickup.texture.tone import Tone
 
 Float32Array = npt.NDArray[np.float32]
 
@@ -47,7 +48,35 @@ def interpolation_taps(fraction: FloatArray) -> Float32Array:
 _TAPS = interpolation_taps(np.arange(PHASES + 1) / PHASES)
 
 
-def follow(columns: Float32Array, path_row: FloatArray, half_px: int) -> tuple[Float32Array, Float32Array]:
+AS_IT_IS = Tone()
+REACH = 7
+"""Rows that a derivative needs on each side."""
+GENTLE = np.array([45.0, -9.0, 1.0]) / 60
+"""Weights of x₁ − x₋₁, x₂ − x₋₂, x₃ − x₋₃ in a derivative that is exact up to the sixth degree and fades beyond a third of a
+cycle a row: it forgives rows that are too far apart for what they show."""
+
+
+def sharp_slope() -> FloatArray:
+    """Return the weights of x₁ − x₋₁ … x₇ − x₋₇ in a derivative that holds nearly up to half a cycle a row.
+
+    The slope of the sinc series, (−1)^(k+1)/k, under a Kaiser window, scaled to be exact for a straight line.
+    """
+    k = np.arange(1, REACH + 1)
+    taps = -((-1.0) ** k) / k * np.i0(KAISER_BETA * np.sqrt(1 - (k / (REACH + 1)) ** 2))
+    return np.asarray(taps / np.sum(2 * k * taps))
+
+
+SHARP = sharp_slope()
+
+
+def follow(
+    columns: Float32Array,
+    path_row: FloatArray,
+    half_px: int,
+    tone: Tone = AS_IT_IS,
+    *,
+    slope: FloatArray = GENTLE,
+) -> tuple[Float32Array, Float32Array]:
     """Return a window of rows about a path, and its derivative with the path.
 
     Parameters
@@ -58,6 +87,10 @@ def follow(columns: Float32Array, path_row: FloatArray, half_px: int) -> tuple[F
         Row of the path in each column; where the window leaves the picture its outermost row is repeated.
     half_px : int
         Rows on each side of the path.
+    tone : Tone
+        In which grey levels are seen, before they are interpolated: bright grains ring less then.
+    slope : float64 array
+        How the derivative is taken: `GENTLE` or `SHARP`.
 
     Returns
     -------
@@ -67,34 +100,32 @@ def follow(columns: Float32Array, path_row: FloatArray, half_px: int) -> tuple[F
         d(window)/d(path_row), grey levels a row; see `across`.
     """
     wide = np.empty((2 * (half_px + REACH) + 1, columns.shape[0]), np.float32)
-    _follow(columns, path_row, _TAPS, wide)
-    return np.ascontiguousarray(wide[REACH:-REACH]), across(wide)
+    _follow(columns, path_row, _TAPS, np.float32(tone.level), np.float32(tone.compression), wide)
+    return np.ascontiguousarray(wide[REACH:-REACH]), across(wide, slope)
 
 
-REACH = 3
-"""Rows that the derivative needs on each side."""
-
-
-def across(rows: Float32Array) -> Float32Array:
-    """Return the derivative of rows with their number, (45 (x₁ − x₋₁) − 9 (x₂ − x₋₂) + (x₃ − x₋₃))/60.
-
-    Exact up to the sixth degree; beyond a third of a cycle a row, where there is only noise, it fades.
+def across(rows: Float32Array, slope: FloatArray) -> Float32Array:
+    """Return the derivative of rows with their number.
 
     Parameters
     ----------
     rows : float32 array, shape (row, column)
+    slope : float64 array
+        `GENTLE` or `SHARP`.
 
     Returns
     -------
-    float32 array, shape (row − 6, column)
+    float32 array, shape (row − 14, column)
     """
     n = rows.shape[0]
-    steps = [rows[3 + k : n - 3 + k] - rows[3 - k : n - 3 - k] for k in (1, 2, 3)]
-    return np.asarray((45 * steps[0] - 9 * steps[1] + steps[2]) * np.float32(1 / 60), np.float32)
+    out = np.zeros((n - 2 * REACH, rows.shape[1]), np.float32)
+    for k, tap in enumerate(slope.astype(np.float32), start=1):
+        out += tap * (rows[REACH + k : n - REACH + k] - rows[REACH - k : n - REACH - k])
+    return out
 
 
 @numba.njit(cache=True, nogil=True)
-def _follow(columns, path_row, taps, window):  # type: ignore[no-untyped-def]
+def _follow(columns, path_row, taps, level, compression, window):  # type: ignore[no-untyped-def]
     rows, width = window.shape
     half = rows // 2
     height = columns.shape[1]
@@ -109,9 +140,17 @@ def _follow(columns, path_row, taps, window):  # type: ignore[no-untyped-def]
         else:
             for j in range(stretch.size):
                 stretch[j] = columns[x, min(max(first + j, 0), height - 1)]
+        if compression > 0:
+            _see(stretch, level, compression)
         _interpolate(stretch, taps[phase], value)
         for j in range(rows):
             window[j, x] = value[j]
+
+
+@numba.njit(cache=True, nogil=True)
+def _see(grey, level, compression):  # type: ignore[no-untyped-def]
+    for j in range(grey.size):
+        grey[j] = level / compression * np.log1p(compression * (max(grey[j], np.float32(0)) / level - np.float32(1)))
 
 
 @numba.njit(cache=True, nogil=True)

@@ -4,7 +4,7 @@ Some groups, spread over the passage, are laid ready and searched coarsely. Then
 paths, sum up their cross-spectra, invert them, move the paths by what the new model says. The first rounds add much to the
 diagonal of C, which makes them forgiving, the last hardly anything. In each round the model is blurred by just the error that
 paths have in that round, so the whole series of models will lead any other stretch in the same way from the coarse path to
-the exact one.
+the exact one. When the first exact model is to be learned it is learned in every tone, and the one that tells most is kept.
 
 A model calls the path that it was learned from right, whatever that is. So the groups are dealt out to a few folds, and the
 cross-spectra that move, judge and read a group are those of the other folds; only the whitening filter, and what scores are
@@ -23,11 +23,19 @@ from gramoscope.conventions import FloatArray, IntArray
 from gramoscope.disc.formats import Cut
 from gramoscope.errors import require
 from gramoscope.pickup.cartridge import Spread
-from gramoscope.pickup.texture.following import Float32Array
+from gramoscope.pickup.texture.following import GENTLE, SHARP, Float32Array
 from gramoscope.pickup.texture.layout import StripeLayout
-from gramoscope.pickup.texture.likelihood import StripeStatistics, believable, quiet_power, scores, softened
+from gramoscope.pickup.texture.likelihood import (
+    StripeStatistics,
+    believable,
+    best_shares,
+    quiet_power,
+    softened,
+    witnesses,
+)
 from gramoscope.pickup.texture.reading import Model, Rules, Stretch, clear_columns, evidence, step, windows
 from gramoscope.pickup.texture.spectrum import Band, CrossSpectra, cross_spectra, precision, whitening_filter
+from gramoscope.pickup.texture.tone import Tone, mean_level
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +68,8 @@ class Learning:
         Frequencies along the groove that are used, cycles a pixel.
     loading : tuple of float
         Of each round; see `spectrum.precision`.
+    compressions : tuple of float
+        Tones to choose from, see `texture.tone`; rounds before the choice use the first.
     least_columns : int
         A stripe seen in fewer columns is not read.
     folds : int
@@ -71,6 +81,7 @@ class Learning:
     band_low: float = 0.02
     band_high: float = 0.35
     loading: tuple[float, ...] = (0.03, 0.03, 0.01, 0.003, 0.001, 0.001, 0.001)
+    compressions: tuple[float, ...] = (0.0, 0.9)
     least_columns: int = 6000
     folds: int = 4
 
@@ -78,6 +89,7 @@ class Learning:
         require(self.half_px >= 4, f"windows of ± {self.half_px} rows", "4 or more")
         require(self.folds >= 2, f"{self.folds} folds", "2 or more")
         require(len(self.loading) >= 1, "no rounds", "at least one loading")
+        require(len(self.compressions) >= 1, "no tone", "at least one compression; 0 leaves pictures as they are")
         require(0 < self.band_low < self.band_high <= 0.5, f"a band of {self.band_low} … {self.band_high}", "0 … 0.5")
 
     def learn(
@@ -106,20 +118,26 @@ class Learning:
         band = Band(self.band_low, self.band_high)
         width = max(stretch.columns.shape[0] for stretch in stretches)
         length = fft.next_fast_len(width + self.largest_lag_px, real=True)
-        whitener = self._whitener(stretches, layout, band, rules, spread)
-        blank = Model(layout, whitener, self.half_px, band, length, ())
+        level = mean_level([stretch.columns for stretch in stretches])
+        tones = [Tone(level, compression) for compression in self.compressions]
+        toned = [Model(layout, tone, np.ones(1), self.half_px, band, length, ()) for tone in tones]
+        blanks = [self._whitening(toned[0], stretches, rules, spread)]
         fold = np.arange(len(stretches)) % self.folds
         lessons: list[Lesson] = []
-        for loading in self.loading:
-            lesson = self._lesson(
-                stretches, fold, blank, lessons[-1].whole if lessons else None, loading, rules, spread
-            )
-            stretches = self._moved(stretches, fold, lesson, cut, rules, spread)
+        choice = int(np.argmin(self.loading))
+        for number, loading in enumerate(self.loading):
+            if number == choice:
+                blanks += [self._whitening(blank, stretches, rules, spread) for blank in toned[1:]]
+            before = lessons[-1].whole if lessons else None
+            tried = [self._lesson(stretches, fold, blank, before, loading, rules, spread) for blank in blanks]
+            lesson = max(tried, key=lambda one: one.whole.precision)
+            blanks = [replace(lesson.whole, stripes=())]
+            stretches = self._improved(stretches, fold, lesson, cut, rules, spread)
             lessons.append(lesson)
             told()
         return tuple(lessons)
 
-    def _moved(
+    def _improved(
         self, stretches: list[Stretch], fold: IntArray, lesson: Lesson, cut: Cut, rules: Rules, spread: Spread
     ) -> list[Stretch]:
         """Improve every path by what the other folds taught."""
@@ -130,25 +148,23 @@ class Learning:
 
         return list(spread(moved, zip(stretches, fold, strict=True)))
 
-    def _whitener(
-        self, stretches: list[Stretch], layout: StripeLayout, band: Band, rules: Rules, spread: Spread
-    ) -> FloatArray:
-        powers = [power for power in spread(lambda s: self._power(s, layout, rules), stretches) if power is not None]
-        if not powers:
-            return whitening_filter(np.ones(129), band)
-        return whitening_filter(np.mean(powers, axis=0), band)
+    def _whitening(self, model: Model, stretches: list[Stretch], rules: Rules, spread: Spread) -> Model:
+        """Return the model with the whitener that its texture needs."""
+        powers = [power for power in spread(lambda s: self._power(s, model, rules), stretches) if power is not None]
+        power = np.mean(powers, axis=0) if powers else np.ones(129)
+        return replace(model, whitener=whitening_filter(power, model.band))
 
-    def _power(self, stretch: Stretch, layout: StripeLayout, rules: Rules) -> FloatArray | None:
+    def _power(self, stretch: Stretch, model: Model, rules: Rules) -> FloatArray | None:
         """Mean power spectrum of the rows of all stripes in pieces of 256 columns."""
-        rows = layout.rows(stretch.displacement_px)
-        visible = layout.visible(rows, half_px=self.half_px)
+        rows = model.layout.rows(stretch.displacement_px)
+        visible = model.layout.visible(rows, half_px=self.half_px)
         taper = np.hanning(256)
         spectra = []
         for number, row in enumerate(rows):
             clear = clear_columns(stretch, number, row, visible[number], self.half_px, rules)
             if not clear.any():
                 continue
-            window, _ = windows(stretch, row, np.ones(1), self.half_px)
+            window, _ = windows(stretch, row, model)
             for start in range(0, clear.size - 256, 128):
                 piece = slice(start, start + 256)
                 if clear[piece].all():
@@ -170,7 +186,8 @@ class Learning:
         whole: list[StripeStatistics | None] = []
         without: list[list[StripeStatistics | None]] = [[] for _ in range(self.folds)]
         for number in range(blank.layout.wall.size):
-            before = previous.stripes[number] if previous is not None else None
+            alike = previous is not None and previous.tone == blank.tone
+            before = previous.stripes[number] if previous is not None and alike else None
             learned = self._stripe(stretches, fold, blank, number, before, loading, rules, spread)
             whole.append(learned[-1])
             for one, statistics in zip(without, learned, strict=False):
@@ -200,8 +217,18 @@ class Learning:
         if min(sum(size for _, _, size in part) for part in parts) < self.least_columns:
             return [None] * len(parts)
         first = [self._statistics(part, blank, loading) for part in parts]
-        mean, answer, power = self._tried(stretches, fold, blank, number, first, rules, spread)
-        return [replace(one, information=answer, mean_score=mean, score_power=power) for one in first]
+        mean, answers, powers = self._tried(stretches, fold, blank, number, first, rules, spread)
+        share = best_shares(answers, powers)
+        return [
+            replace(
+                one,
+                share=share,
+                mean_score=float(share @ mean),
+                information=max(float(share @ answers), 1e-6),
+                score_power=float(share @ powers @ share),
+            )
+            for one in first
+        ]
 
     def _statistics(
         self, sums: list[tuple[CrossSpectra, FloatArray, float]], blank: Model, loading: float
@@ -210,23 +237,41 @@ class Learning:
         total = CrossSpectra(2 * self.half_px + 1, blank.length)
         for one, _, _ in sums:
             total.add(one)
-        c = total.spectra(largest_lag_px=self.largest_lag_px, length=blank.length)
-        inverse, noise = precision(c, band=blank.band.bins(blank.length), loading=loading)
+        bins = blank.band.bins(blank.length)
+        c, change = total.spectra(largest_lag_px=self.largest_lag_px, length=blank.length)
+        inverse, noise = precision(c, band=bins, loading=loading)
         row_power = np.sum([power for _, power, _ in sums], axis=0) / columns
-        return StripeStatistics(inverse, noise, 1.0, 1.0, 0.0, row_power.astype(np.float32), int(columns))
+        return StripeStatistics(
+            inverse,
+            change[bins].astype(np.float32),
+            noise,
+            np.array([1.0, 0.0]),
+            1.0,
+            1.0,
+            0.0,
+            row_power.astype(np.float32),
+            int(columns),
+        )
 
     def _sums(
         self, stretch: Stretch, model: Model, number: int, before: StripeStatistics | None, rules: Rules
     ) -> tuple[CrossSpectra, FloatArray, float] | None:
-        laid = self._laid(stretch, model, number, before, rules)
+        laid = self._laid(stretch, model, number, before, rules, slope=SHARP)
         if laid is None:
             return None
-        window, _, weight = laid
-        spectra = cross_spectra(window, weight, length=model.length)
+        window, derivative, weight = laid
+        spectra = cross_spectra(window, derivative, weight, length=model.length)
         return spectra, (window**2 * weight).sum(axis=1).astype(np.float64), float(weight.sum())
 
     def _laid(
-        self, stretch: Stretch, model: Model, number: int, before: StripeStatistics | None, rules: Rules
+        self,
+        stretch: Stretch,
+        model: Model,
+        number: int,
+        before: StripeStatistics | None,
+        rules: Rules,
+        *,
+        slope: FloatArray = GENTLE,
     ) -> tuple[Float32Array, Float32Array, Float32Array] | None:
         """Return window, derivative and weight of a stripe; None where too little of it can be seen."""
         rows = model.layout.rows(stretch.displacement_px)
@@ -235,7 +280,7 @@ class Learning:
         clear = clear_columns(stretch, number, row, seen, self.half_px, rules)
         if not clear.any():
             return None
-        window, derivative = windows(stretch, row, model.whitener, self.half_px)
+        window, derivative = windows(stretch, row, model, slope=slope)
         usual = before.row_power if before is not None else np.median(window**2, axis=1) / 0.455
         clear &= believable(window, usual, limits=rules.power_limits)
         weight = softened(clear)
@@ -250,30 +295,30 @@ class Learning:
         learned: list[StripeStatistics],
         rules: Rules,
         spread: Spread,
-    ) -> tuple[float, float, float]:
-        """Measure the mean of a stripe's scores, how they answer to a moved path, and their power."""
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Measure the mean of what a stripe's witnesses say, how they answer to a moved path, and their powers."""
 
-        def tried(pair: tuple[Stretch, int]) -> tuple[FloatArray, FloatArray, float] | None:
+        def tried(pair: tuple[Stretch, int]) -> tuple[FloatArray, FloatArray, FloatArray] | None:
             stretch, statistics = pair[0], learned[pair[1]]
             laid = self._laid(stretch, blank, number, statistics, rules)
             if laid is None:
                 return None
             window, derivative, weight = laid
-            u = scores(window, derivative, weight, statistics, band=blank.band, length=blank.length)
+            u = witnesses(window, derivative, weight, statistics, band=blank.band, length=blank.length)
             answers = [
-                float(np.sum(weight * self._moved_score(stretch, blank, number, statistics, weight, side * MOVE_PX)))
-                for side in (-1, 1)
+                self._moved(stretch, blank, number, statistics, weight, side * MOVE_PX) @ weight for side in (-1, 1)
             ]
             return u, weight.astype(np.float64), (answers[0] - answers[1]) / (2 * MOVE_PX)
 
         told = [one for one in spread(tried, zip(stretches, fold, strict=True)) if one is not None]
         columns = max(sum(float(w.sum()) for _, w, _ in told), 1.0)
-        mean = sum(float(np.sum(u * w)) for u, w, _ in told) / columns
-        powers = np.sum([quiet_power(u - mean, w) for u, w, _ in told], axis=0)
-        answer = sum(answer for _, _, answer in told) / columns
-        return mean, max(answer, 1e-6), float(powers[0] / max(powers[1], 1e-12))
+        mean = np.sum([u @ w for u, w, _ in told], axis=0) / columns
+        quiet = [quiet_power(u - mean[:, np.newaxis], w) for u, w, _ in told]
+        powers = np.sum([power for power, _ in quiet], axis=0) / max(sum(size for _, size in quiet), 1e-12)
+        answers = np.sum([answer for _, _, answer in told], axis=0) / columns
+        return mean, answers, powers
 
-    def _moved_score(
+    def _moved(
         self,
         stretch: Stretch,
         model: Model,
@@ -283,8 +328,8 @@ class Learning:
         move_px: float,
     ) -> FloatArray:
         row = model.layout.rows(stretch.displacement_px)[number] + move_px
-        window, derivative = windows(stretch, row, model.whitener, self.half_px)
-        return scores(window, derivative, weight, statistics, band=model.band, length=model.length)
+        window, derivative = windows(stretch, row, model)
+        return witnesses(window, derivative, weight, statistics, band=model.band, length=model.length)
 
 
 MOVE_PX = 0.1

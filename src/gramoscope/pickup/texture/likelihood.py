@@ -1,14 +1,18 @@
 """How likely a path of the groove is, and which way it should move.
 
 Whitened windows x that follow the right path are Gaussian with the cross-spectra C_f that the passage taught. If the path is
-moved by δ(s) across the rows, x changes by δ(s) x'(s), and the log-likelihood −½ Σ_f x_fᴴ C_f⁻¹ x_f by δ(s) times the score
+moved by δ(s) across the rows, x changes by δ(s) x'(s), and its cross-spectra by δ C′. Two witnesses tell from that in which
+direction a path should move, each with the constant that makes it zero on average:
 
-    u(s) = −x̂'(s) · y(s) + constant,     y = C⁻¹ x,     x̂ = x − N y,
+    u₁(s) = −x̂'(s) · y(s),     y = C⁻¹ x,     x̂ = x − N y,
+    u₂(s) = −½ y(s) · (C′ y)(s),
 
-with C⁻¹ applied in the frequency domain: exact for every column, whatever the bandwidth of the sound. Only the texture x̂ moves
-with the groove, the camera's noise of the power N does not, so its share is taken out of the derivative. The expected change
-of the score with δ is Fisher's information I for one column. So u/I estimates what is missing from the path, with the error
-√J/I, where J is the real power of the score: equal to I if the texture is what the model says, measured because it is not.
+with C⁻¹ and C′ applied in the frequency domain: local in every column, whatever the bandwidth of the sound. The first is the
+derivative of −½ Σ_f x_fᴴ C_f⁻¹ x_f along the picture's own change, from which the camera's noise of the power N is left out, as
+only the texture x̂ moves with the groove. The second is the score of the Gaussian likelihood of the window, and efficient if
+the texture is Gaussian and C′ well known; the first needs no C′ and forgives more. How far either can be trusted is measured:
+with their answers I to a path that is moved and their real powers J, a matrix, the weights J⁻¹I make of both the best score.
+Its answer is Iᵀ J⁻¹ I, and so is its power; u/I estimates what is missing from the path, with the error √J/I.
 """
 
 from __future__ import annotations
@@ -19,7 +23,7 @@ import numpy as np
 from scipy import fft, ndimage
 
 from gramoscope.conventions import BoolArray, FloatArray
-from gramoscope.pickup.texture.following import REACH, Float32Array, across
+from gramoscope.pickup.texture.following import GENTLE, REACH, Float32Array, across
 from gramoscope.pickup.texture.spectrum import Band
 
 TAPER_PX = 16
@@ -38,10 +42,12 @@ class StripeStatistics:
 
     Attributes
     ----------
-    inverse : float32 array, shape (bin in the band, row, row)
-        C_f⁻¹.
+    inverse, change : float32 arrays, shape (bin in the band, row, row)
+        C_f⁻¹ and C′_f.
     noise : float32 array, shape (bin in the band,)
         N.
+    share : float64 array, shape (2,)
+        By how much each witness takes part in the score.
     information : float
         I of one column, per row²: how the mean score answers to a move of the path.
     score_power : float
@@ -55,7 +61,9 @@ class StripeStatistics:
     """
 
     inverse: Float32Array
+    change: Float32Array
     noise: Float32Array
+    share: FloatArray
     information: float
     score_power: float
     mean_score: float
@@ -68,7 +76,7 @@ class StripeStatistics:
         return self.information / self.score_power if self.score_power > 0 else 0.0
 
 
-def scores(
+def witnesses(
     window: Float32Array,
     derivative: Float32Array,
     weight: Float32Array,
@@ -77,10 +85,10 @@ def scores(
     band: Band,
     length: int,
 ) -> FloatArray:
-    """Return the score of each column, without its constant, and tempered.
+    """Return what both witnesses say in each column, without their constants, and tempered.
 
     Real texture is not Gaussian: a cluster of bright grains is louder than the rest in everything it says, truth and error
-    alike. The score of each column is therefore divided by 0.3 + m, where m is the local value of xᵀC⁻¹x, 1 on average (the
+    alike. What they say is therefore divided by 0.3 + m, where m is the local value of xᵀC⁻¹x, 1 on average (the
     weight of a t-distribution with few degrees of freedom). On skewed textures that is worth 5 dB.
 
     Parameters
@@ -93,6 +101,11 @@ def scores(
     band : Band
     length : int
         Of the transform, at least the number of columns.
+
+    Returns
+    -------
+    float64 array, shape (2, column)
+        u₁ and u₂.
     """
     bins = band.bins(length)
     spectrum = fft.rfft(window * weight, length)
@@ -104,12 +117,39 @@ def scores(
     y = fft.irfft(full, length)[:, : window.shape[1]]
     full[:, bins] *= learned.noise
     still = np.pad(fft.irfft(full, length)[:, : window.shape[1]], ((REACH, REACH), (0, 0))).astype(np.float32)
-    moving = np.subtract(derivative, across(still))
+    moving = np.subtract(derivative, across(still, GENTLE))
+    changed = learned.change @ explained
+    full[:, bins] = (changed[:, :, 0] + 1j * changed[:, :, 1]).T
+    turned = fft.irfft(full, length)[:, : window.shape[1]]
     # as many degrees of freedom a column as rows, in the share of the spectrum that is used
     freedom = window.shape[0] * 2 * (bins.stop - bins.start) / length
     loudness = ndimage.gaussian_filter1d(np.einsum("ij,ij->j", window, y), LOUDNESS_PX, mode="nearest") / freedom
-    tempered = np.einsum("ij,ij->j", moving, y) / (TEMPER + np.maximum(loudness, 0.0))
-    return np.asarray(-tempered, np.float64)
+    said = [np.einsum("ij,ij->j", moving, y), 0.5 * np.einsum("ij,ij->j", turned, y)]
+    return np.asarray(-np.array(said, np.float64) / (TEMPER + np.maximum(loudness, 0.0)))
+
+
+def best_shares(answers: FloatArray, powers: FloatArray) -> FloatArray:
+    """Return how witnesses should take part in the score: J⁻¹I, none against its own word.
+
+    Parameters
+    ----------
+    answers : float64 array, shape (2,)
+        I: how the mean of each answers to a moved path.
+    powers : float64 array, shape (2, 2)
+        J: their power and what they have in common.
+
+    Returns
+    -------
+    float64 array, shape (2,)
+        Zero or more; both zero if neither answers.
+    """
+    own = np.diag(powers)
+    alone = np.where((own > 0) & (answers > 0), answers / np.maximum(own, 1e-30), 0.0)
+    both = np.linalg.solve(powers + np.diag(0.02 * own + 1e-30), answers)
+    if (both > 0).all() and (alone > 0).all():
+        return np.asarray(both)
+    better = np.argmax(alone * answers)
+    return np.asarray(np.where(np.arange(answers.size) == better, alone, 0.0))
 
 
 def softened(valid: BoolArray) -> Float32Array:
@@ -119,25 +159,26 @@ def softened(valid: BoolArray) -> Float32Array:
     return np.asarray(ndimage.convolve1d(core.astype(np.float64), bell / bell.sum(), mode="nearest"), np.float32)
 
 
-def quiet_power(score: FloatArray, weight: FloatArray) -> tuple[float, float]:
-    """Return the power of a score at frequencies where no sound is, times the weight it rests on, and that weight.
+def quiet_power(said: FloatArray, weight: FloatArray) -> tuple[FloatArray, float]:
+    """Return the power of scores at frequencies where no sound is, times the weight it rests on, and that weight.
 
     Parameters
     ----------
-    score : float64 array, shape (column,)
+    said : float64 array, shape (score, column)
         Zero on average.
     weight : float64 array, shape (column,)
         0 … 1; the score counts so much.
 
     Returns
     -------
-    power, columns : float
+    power : float64 array, shape (score, score)
+    columns : float
         Their ratio estimates J; sums of both over windows may be divided too.
     """
-    length = fft.next_fast_len(2 * score.size, real=True)
+    length = fft.next_fast_len(2 * weight.size, real=True)
     low, high = (int(np.ceil(f * length)) for f in QUIET_BAND)
-    spectrum = fft.rfft(score * weight, length)[low:high]
-    return float(np.mean(np.abs(spectrum) ** 2)), float(np.sum(weight**2))
+    spectrum = fft.rfft(said * weight, length)[:, low:high]
+    return np.asarray((spectrum @ spectrum.conj().T).real / (high - low)), float(np.sum(weight**2))
 
 
 def believable(

@@ -16,10 +16,11 @@ from scipy import ndimage
 
 from gramoscope.conventions import INNER, OUTER, BoolArray, FloatArray
 from gramoscope.disc.formats import Cut
-from gramoscope.pickup.texture.following import Float32Array, follow
+from gramoscope.pickup.texture.following import GENTLE, Float32Array, follow
 from gramoscope.pickup.texture.layout import StripeLayout
-from gramoscope.pickup.texture.likelihood import StripeStatistics, believable, quiet_power, scores, softened
+from gramoscope.pickup.texture.likelihood import StripeStatistics, believable, quiet_power, softened, witnesses
 from gramoscope.pickup.texture.spectrum import Band, filtered
+from gramoscope.pickup.texture.tone import Tone
 
 BURNT_SHARE = 0.15
 """Of the rows of a window in one column: a bright grain or two do no harm, a scratch does."""
@@ -61,6 +62,8 @@ class Model:
     Attributes
     ----------
     layout : StripeLayout
+    tone : Tone
+        In which windows are seen.
     whitener : float64 array
     half_px : int
         Rows of the windows on each side of a path.
@@ -72,11 +75,17 @@ class Model:
     """
 
     layout: StripeLayout
+    tone: Tone
     whitener: FloatArray
     half_px: int
     band: Band
     length: int
     stripes: tuple[StripeStatistics | None, ...]
+
+    @property
+    def precision(self) -> float:
+        """What all stripes told about their places in the passage that was learned from: Σ columns · I²/J."""
+        return sum(one.columns * one.trust * one.information for one in self.stripes if one is not None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,11 +136,11 @@ class Rules:
 
 
 def windows(
-    stretch: Stretch, stripe_row: FloatArray, whitener: FloatArray, half_px: int
+    stretch: Stretch, stripe_row: FloatArray, model: Model, *, slope: FloatArray = GENTLE
 ) -> tuple[Float32Array, Float32Array]:
     """Return the whitened window about a path and its derivative, shape (row, column)."""
-    window, derivative = follow(stretch.columns, stripe_row, half_px)
-    return filtered(window, whitener), filtered(derivative, whitener)
+    window, derivative = follow(stretch.columns, stripe_row, model.half_px, model.tone, slope=slope)
+    return filtered(window, model.whitener), filtered(derivative, model.whitener)
 
 
 def clear_columns(
@@ -157,16 +166,16 @@ def evidence(stretch: Stretch, model: Model, rules: Rules) -> Evidence:
         clear = clear_columns(stretch, number, row, visible[number], model.half_px, rules)
         if not clear.any():
             continue
-        window, derivative = windows(stretch, row, model.whitener, model.half_px)
+        window, derivative = windows(stretch, row, model)
         clear &= believable(window, statistics.row_power, limits=rules.power_limits)
         weight = softened(clear)
-        u = scores(window, derivative, weight, statistics, band=model.band, length=model.length)
+        u = statistics.share @ witnesses(window, derivative, weight, statistics, band=model.band, length=model.length)
         weight64 = weight.astype(np.float64)
         u = (u - statistics.mean_score) * statistics.trust
         score[wall] += weight64 * u
         information[wall] += weight64 * statistics.trust * statistics.information
-        power, columns = quiet_power(u, weight64)
-        surprise[wall] += power, columns * statistics.trust**2 * statistics.score_power
+        power, columns = quiet_power(u[np.newaxis], weight64)
+        surprise[wall] += power[0, 0], columns * statistics.trust**2 * statistics.score_power
     with np.errstate(invalid="ignore", divide="ignore"):
         return Evidence(score, information, surprise[:, 0] / surprise[:, 1])
 

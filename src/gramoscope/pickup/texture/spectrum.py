@@ -7,7 +7,7 @@ stationary along the groove, everything that second moments can tell is in the c
 
 real because a groove has no preferred direction along itself. Lags beyond the blur discs carry nothing but chance, so the
 sums are cut off there (Blackman and Tukey's lag window), which also makes C_f smooth in f. Moving the window by δ across
-the rows changes C_f by δ · dC_f, with dC_f from the cross-spectra of the window and its derivative.
+the rows changes C_f by δ · C′_f, with C′_f from the cross-spectra of the window and its derivative.
 
 A texture's power falls by five orders of magnitude along the band, and what leaks from the strong end would drown the weak
 end where the information is. All windows are therefore whitened along the groove first, by one short filter for all rows.
@@ -18,6 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy import fft, signal
 
 from gramoscope.conventions import FloatArray
@@ -95,15 +96,17 @@ class CrossSpectra:
     def __post_init__(self) -> None:
         bins = self.length // 2 + 1
         self.within: FloatArray = np.zeros((bins, self.rows, self.rows))
+        self.change: FloatArray = np.zeros((bins, self.rows, self.rows))
         self.weight: FloatArray = np.zeros(bins)
 
     def add(self, other: CrossSpectra) -> None:
         """Add the sums of other windows."""
         self.within += other.within
+        self.change += other.change
         self.weight += other.weight
 
-    def spectra(self, *, largest_lag_px: int, length: int) -> FloatArray:
-        """Return C_f.
+    def spectra(self, *, largest_lag_px: int, length: int) -> tuple[FloatArray, FloatArray]:
+        """Return C_f and C′_f.
 
         Parameters
         ----------
@@ -114,36 +117,47 @@ class CrossSpectra:
 
         Returns
         -------
-        float64 array, shape (length // 2 + 1, row, row)
+        C, change : float64 arrays, shape (length // 2 + 1, row, row)
         """
         u = np.arange(largest_lag_px + 1) / (largest_lag_px + 1)
         taper = np.where(u < 0.5, 1.0, 0.5 * (1 + np.cos(2 * np.pi * (u - 0.5))))
         columns = np.maximum(fft.irfft(self.weight, self.length)[: u.size], 1.0)
-        covariance = fft.irfft(self.within, self.length, axis=0)[: u.size] * (taper / columns)[:, None, None]
-        full = np.zeros((length, self.rows, self.rows))
-        full[: u.size] = covariance
-        full[-u.size + 1 :] = covariance[1:][::-1]
-        return np.asarray(fft.rfft(full, axis=0).real)
+
+        def smoothed(sums: FloatArray) -> FloatArray:
+            covariance = fft.irfft(sums, self.length, axis=0)[: u.size] * (taper / columns)[:, None, None]
+            full = np.zeros((length, self.rows, self.rows))
+            full[: u.size] = covariance
+            full[-u.size + 1 :] = covariance[1:][::-1]
+            return np.asarray(fft.rfft(full, axis=0).real)
+
+        return smoothed(self.within), smoothed(self.change)
 
 
-def cross_spectra(window: Float32Array, weight: Float32Array, *, length: int) -> CrossSpectra:
+def cross_spectra(window: Float32Array, derivative: Float32Array, weight: Float32Array, *, length: int) -> CrossSpectra:
     """Return the cross-spectra of one window, zero where its columns have no weight.
 
     Parameters
     ----------
-    window : float32 array, shape (row, column)
+    window, derivative : float32 arrays, shape (row, column)
         Whitened.
     weight : float32 array, shape (column,)
         0 … 1, rising and falling softly.
     length : int
         Of the transforms.
     """
-    x = np.ascontiguousarray(fft.rfft(window * weight, length).T)
     out = CrossSpectra(window.shape[0], length)
-    left = np.stack([x.real, x.imag], axis=2)
-    out.within += left @ left.transpose(0, 2, 1)
+    seen, moved = (_parts(fft.rfft(rows * weight, length)) for rows in (window, derivative))
+    out.within += seen @ seen.transpose(0, 2, 1)
+    half = moved @ seen.transpose(0, 2, 1)
+    out.change += half + half.transpose(0, 2, 1)
     out.weight += np.abs(fft.rfft(weight.astype(np.float64), length)) ** 2
     return out
+
+
+def _parts(spectrum: npt.NDArray[np.complex64]) -> Float32Array:
+    """Return real and imaginary parts, shape (bin, row, 2)."""
+    x = np.ascontiguousarray(spectrum.T)
+    return np.stack([x.real, x.imag], axis=2)
 
 
 def precision(
