@@ -21,7 +21,7 @@ Float32Array = npt.NDArray[np.float32]
 
 TAPS = 10
 PHASES = 512
-KAISER_BETA = 6.0
+KAISER_BETA = 4.0
 BEFORE = TAPS // 2 - 1
 """Rows that the kernel reaches before the one at or below a place."""
 
