@@ -16,6 +16,7 @@ from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.likelihood import StripeStatistics
 from gramoscope.pickup.texture.reading import Model
 from gramoscope.pickup.texture.spectrum import Band
+from gramoscope.pickup.texture.tone import Tone
 from gramoscope.simulation.scene import filming_bench
 
 BENCH = filming_bench(height_px=448)
@@ -79,8 +80,9 @@ def test_pictures_that_show_nothing_leave_the_layout_as_the_manifest_has_it() ->
 
 
 def _model(layout: StripeLayout) -> Model:
-    one = StripeStatistics(np.zeros((1, 3, 3), np.float32), np.zeros(1, np.float32), 4.0, 8.0, 0.0, np.ones(3), 9000)
-    return Model(layout, np.ones(1), 1, Band(), 64, (None, one, one, one))
+    matrix, share = np.zeros((1, 3, 3), np.float32), np.array([1.0, 0.0])
+    one = StripeStatistics(matrix, matrix, np.zeros(1, np.float32), share, 4.0, 8.0, 0.0, np.ones(3), 9000)
+    return Model(layout, Tone(), np.ones(1), 1, Band(), 64, (None, one, one, one))
 
 
 def test_measured_stands_beside_stated_in_micrometres_and_degrees() -> None:

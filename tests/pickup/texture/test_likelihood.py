@@ -1,4 +1,4 @@
-"""The score of a window whose covariance is known: its mean, its power, and how near it comes to what can be known at all.
+"""What both witnesses say of a window whose covariance is known, and how near that comes to what can be known at all.
 
 The texture is white along the groove, smooth over a row or two, and blurred the more the further a row lies from the sharp
 one: two rows have the covariance H(i) H(j) ρ(i − j) at every frequency, in closed form.
@@ -10,14 +10,16 @@ import numpy as np
 import pytest
 from scipy import fft, ndimage
 
+from gramoscope.pickup.texture import likelihood
 from gramoscope.pickup.texture.following import follow
 from gramoscope.pickup.texture.likelihood import (
     TAPER_PX,
     StripeStatistics,
     believable,
+    best_shares,
     quiet_power,
-    scores,
     softened,
+    witnesses,
 )
 from gramoscope.pickup.texture.spectrum import Band
 
@@ -53,40 +55,90 @@ def _covariance(move_px: float) -> np.ndarray:
     return np.einsum("if,jf,ij->fij", response, response, near)
 
 
+def _change(move_px: float) -> np.ndarray:
+    """Its derivative: a row's response H(i) falls by 4 (π f b)² i H(i) a row."""
+    place = np.arange(-HALF_PX, HALF_PX + 1) + move_px
+    frequency = np.fft.rfftfreq(LENGTH)[BAND.bins(LENGTH)]
+    fall = -4 * (np.pi * frequency[:, None] * BLUR_PX_PER_ROW) ** 2 * place
+    return _covariance(move_px) * (fall[:, :, None] + fall[:, None, :])
+
+
 @dataclass(frozen=True)
 class Known:
-    """The model of that texture, and Fisher's information of one column."""
+    """The model of that texture, Fisher's information of one column, and the second witness' constant."""
 
     statistics: StripeStatistics
     fisher: float
+    constant: float
+
+
+def _known(move_px: float = 0.0) -> Known:
+    rows = 2 * HALF_PX + 1
+    inverse = np.linalg.inv(_covariance(move_px) + NOISE * np.eye(rows))
+    answer = inverse @ _change(move_px)
+    statistics = StripeStatistics(
+        inverse.astype(np.float32),
+        _change(move_px).astype(np.float32),
+        np.full(len(inverse), NOISE, np.float32),
+        np.array([0.5, 0.5]),
+        information=1.0,
+        score_power=1.0,
+        mean_score=0.0,
+        row_power=np.ones(rows, np.float32),
+        columns=1,
+    )
+    fisher = float(np.einsum("fij,fji->", answer, answer)) / LENGTH
+    return Known(statistics, fisher, -float(np.einsum("fii->", answer)) / LENGTH)
 
 
 @pytest.fixture(scope="module")
 def known() -> Known:
-    rows = 2 * HALF_PX + 1
-    inverse = np.linalg.inv(_covariance(0.0) + NOISE * np.eye(rows))
-    change = (_covariance(0.01) - _covariance(-0.01)) / 0.02
-    answer = inverse @ change
-    fisher = float(np.einsum("fij,fji->", answer, answer)) / LENGTH
-    noise = np.full(len(inverse), NOISE, np.float32)
-    return Known(
-        StripeStatistics(inverse.astype(np.float32), noise, 1.0, 1.0, 0.0, np.ones(rows, np.float32), 1), fisher
-    )
+    return _known()
 
 
-def _score(picture: np.ndarray, known: Known, move_px: float = 0.0) -> np.ndarray:
+def _said(picture: np.ndarray, known: Known, move_px: float = 0.0) -> np.ndarray:
     window, derivative = follow(picture, np.full(WIDTH, SHARP_ROW + move_px), HALF_PX)
     weight = np.ones(WIDTH, np.float32)
-    return scores(window, derivative, weight, known.statistics, band=BAND, length=LENGTH)[40:-40]
+    return witnesses(window, derivative, weight, known.statistics, band=BAND, length=LENGTH)[:, 40:-40]
 
 
-@pytest.fixture(scope="module")
-def heard(known: Known) -> np.ndarray:
-    """Scores of fifty textures, each with its path at several places beside the sharp row."""
+def _all_said(known: Known) -> np.ndarray:
+    """By both witnesses of fifty textures, each with its path at several places beside the sharp row."""
     rng = np.random.default_rng(12)
     pictures = [_picture(rng) for _ in range(50)]
     moves = MOVE_PX * np.arange(-2, 3)
-    return np.array([[_score(picture, known, move) for move in moves] for picture in pictures])
+    said = np.array([[_said(picture, known, move) for move in moves] for picture in pictures])
+    return np.ascontiguousarray(said.transpose(2, 0, 1, 3))
+
+
+@pytest.fixture(scope="module")
+def both(known: Known) -> np.ndarray:
+    return _all_said(known)
+
+
+@pytest.fixture(params=[0, 1], ids=["first witness", "second witness"])
+def heard(both: np.ndarray, request: pytest.FixtureRequest) -> np.ndarray:
+    """What one of them said."""
+    return np.asarray(both[request.param])
+
+
+@pytest.fixture(scope="module")
+def untempered(known: Known) -> np.ndarray:
+    """What both say as long as clusters of grains are believed as the rest."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(likelihood, "TEMPER", 1e9)
+        return 1e9 * _all_said(known)
+
+
+def _power(said: np.ndarray, weight: np.ndarray | None = None) -> float:
+    """Quiet power of one witness in many textures."""
+    weight = np.ones(said.shape[-1]) if weight is None else weight
+    told = [quiet_power(one[np.newaxis], weight) for one in said]
+    return float(sum(power[0, 0] for power, _ in told) / sum(size for _, size in told))
+
+
+def _answer(said: np.ndarray) -> float:
+    return float(said[:, 1].mean() - said[:, 3].mean()) / (2 * MOVE_PX)
 
 
 def test_a_path_beside_the_stripe_is_told_to_go_back_in_proportion(heard: np.ndarray) -> None:
@@ -103,7 +155,7 @@ def test_on_the_stripe_both_sides_are_as_likely(heard: np.ndarray) -> None:
 
 
 def test_what_is_read_from_a_column_is_nearly_all_that_can_be_known(heard: np.ndarray, known: Known) -> None:
-    information = (heard[:, 1].mean() - heard[:, 3].mean()) / (2 * MOVE_PX)
+    information = _answer(heard)
     columns = heard.shape[2]
     error = heard[:, 2].mean(axis=1) / information
     bound = 1 / np.sqrt(columns * known.fisher)
@@ -112,18 +164,67 @@ def test_what_is_read_from_a_column_is_nearly_all_that_can_be_known(heard: np.nd
 
 
 def test_the_claimed_error_is_the_real_one_or_a_little_more(heard: np.ndarray) -> None:
-    information = (heard[:, 1].mean() - heard[:, 3].mean()) / (2 * MOVE_PX)
-    powers = np.sum([quiet_power(score, np.ones(score.size)) for score in heard[:, 2] - heard[:, 2].mean()], axis=0)
-    claimed = np.sqrt(powers[0] / powers[1] / heard.shape[2]) / information
+    information = _answer(heard)
+    claimed = np.sqrt(_power(heard[:, 2] - heard[:, 2].mean()) / heard.shape[2]) / information
     assert 0.8 < claimed / (heard[:, 2].mean(axis=1) / information).std() < 1.6
+
+
+def test_the_second_witness_answers_with_all_that_can_be_known(untempered: np.ndarray, known: Known) -> None:
+    said = untempered[1]
+    assert _answer(said) == pytest.approx(known.fisher, rel=0.05)
+    assert _power(said[:, 2]) == pytest.approx(known.fisher, rel=0.1)
+    assert _answer(said) / _power(said[:, 2]) == pytest.approx(1, abs=0.1)
+
+
+def test_the_error_of_the_second_witness_is_as_small_as_an_error_can_be(both: np.ndarray, known: Known) -> None:
+    pieces = both[1][:, 2].reshape(len(both[1]), 4, -1)
+    error = np.std(pieces.mean(axis=2)) / _answer(both[1])
+    assert error * np.sqrt(pieces.shape[2] * known.fisher) == pytest.approx(1, abs=0.12)
+
+
+def test_where_the_texture_is_not_alike_on_both_sides_the_second_witness_has_a_constant(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(likelihood, "TEMPER", 1e9)
+    rng, known = np.random.default_rng(5), _known(2.5)
+    said = 1e9 * np.array([_said(_picture(rng), known, 2.5)[1] for _ in range(20)])
+    error = np.sqrt(known.fisher / said.size)
+    assert known.constant > 10 * error
+    assert said.mean() == pytest.approx(known.constant, abs=4 * error)
+
+
+def test_both_witnesses_point_the_same_way(both: np.ndarray) -> None:
+    first, second = both[:, :, 2].mean(axis=2)
+    assert np.corrcoef(first, second)[0, 1] > 0.5
+    assert min(_answer(said) for said in both) > 0
+
+
+def _answers_and_powers(both: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    told = [quiet_power(said, np.ones(said.shape[1])) for said in both[:, :, 2].swapaxes(0, 1)]
+    powers = np.sum([power for power, _ in told], axis=0) / np.sum([size for _, size in told])
+    return np.array([_answer(said) for said in both]), powers
+
+
+def test_what_the_first_has_in_common_with_the_score_is_its_answer(untempered: np.ndarray) -> None:
+    answers, powers = _answers_and_powers(untempered)
+    assert powers[0, 1] == pytest.approx(answers[0], rel=0.15)
+
+
+def test_beside_a_witness_that_knows_all_no_other_is_needed(both: np.ndarray) -> None:
+    share = best_shares(*_answers_and_powers(both))
+    assert share[1] > 0
+    assert abs(share[0]) < 0.1 * share[1]
+    together = np.tensordot(share, both, 1)
+    errors = [np.std(said[:, 2].mean(axis=1)) / _answer(said) for said in (*both, together)]
+    assert errors[2] < 1.02 * min(errors[:2])
 
 
 def test_a_texture_twice_as_contrasty_says_the_same_with_the_same_model(known: Known) -> None:
     picture = _picture(np.random.default_rng(3))
-    soft, loud = _score(picture, known, 0.5), _score(2 * picture, known, 0.5)
     # a Gaussian model would believe it four times as much
-    assert loud.mean() / soft.mean() < 2.2
-    assert np.corrcoef(soft, loud)[0, 1] > 0.97
+    for soft, loud in zip(_said(picture, known, 0.5), _said(2 * picture, known, 0.5), strict=True):
+        assert loud.mean() / soft.mean() < 2.2
+        assert np.corrcoef(soft, loud)[0, 1] > 0.97
 
 
 def test_columns_without_weight_do_not_speak_into_their_neighbours(known: Known) -> None:
@@ -136,10 +237,54 @@ def test_columns_without_weight_do_not_speak_into_their_neighbours(known: Known)
     spoilt[430:520] += 40 * rng.normal(size=(90, HEIGHT)).astype(np.float32)
     path = np.full(WIDTH, SHARP_ROW)
     clean, dirty = (
-        scores(*follow(one, path, HALF_PX), weight, known.statistics, band=BAND, length=LENGTH) * weight
+        witnesses(*follow(one, path, HALF_PX), weight, known.statistics, band=BAND, length=LENGTH) * weight
         for one in (picture, spoilt)
     )
-    np.testing.assert_allclose(dirty, clean, atol=0.02 * np.std(clean))
+    np.testing.assert_allclose(dirty / clean.std(axis=1)[:, None], clean / clean.std(axis=1)[:, None], atol=0.02)
+
+
+def test_witnesses_that_know_nothing_of_each_other_count_by_answer_over_power() -> None:
+    answers, powers = np.array([2.0, 0.5]), np.array([7.0, 0.1])
+    np.testing.assert_allclose(best_shares(answers, np.diag(powers)), answers / powers, rtol=0.021)
+
+
+@pytest.mark.parametrize("common", [-0.6, 0.0, 0.4])
+def test_witnesses_count_by_what_each_knows_alone(common: float) -> None:
+    answers, powers = np.array([1.0, 0.8]), np.array([[1.0, common], [common, 1.0]])
+    best = np.array([1.0 - 0.8 * common, 0.8 - common]) / (1 - common**2)
+    np.testing.assert_allclose(best_shares(answers, powers), best, rtol=0.06)
+
+
+@pytest.mark.parametrize(
+    ("answer", "common"),
+    [(0.0, 0.0), (-0.3, 0.0), (0.0, -0.9), (-0.05, -0.9), (0.1, 0.9)],
+    ids=["silent", "contrary", "silent but alike", "contrary but alike", "an echo to be taken off"],
+)
+@pytest.mark.parametrize("order", [1, -1])
+def test_no_witness_counts_that_does_not_answer_or_against_its_own_word(
+    answer: float, common: float, order: int
+) -> None:
+    powers = np.array([[4.0, 2 * common], [2 * common, 1.0]])[::order, ::order]
+    share = best_shares(np.array([2.0, answer])[::order], powers)
+    np.testing.assert_allclose(share[::order], [0.5, 0.0])
+
+
+@pytest.mark.parametrize("powers", [np.eye(2), np.zeros((2, 2))])
+def test_if_neither_answers_neither_counts(powers: np.ndarray) -> None:
+    for answers in ([0.0, 0.0], [-1.0, -2.0], [-1.0, 0.0]):
+        np.testing.assert_array_equal(best_shares(np.array(answers), powers), 0)
+
+
+def test_no_mixture_is_less_precise_than_the_better_witness() -> None:
+    rng = np.random.default_rng(10)
+    for _ in range(300):
+        root = rng.normal(size=(2, 2))
+        powers, answers = root @ root.T, rng.normal(0.5, 1, 2)
+        share = best_shares(answers, powers)
+        assert (share >= 0).all()
+        alone = np.max(np.maximum(answers, 0) ** 2 / np.diag(powers))
+        if alone > 0:
+            assert (share @ answers) ** 2 / (share @ powers @ share) > alone / 1.021
 
 
 def test_a_weight_is_soft_zero_where_nothing_is_seen_and_one_well_inside() -> None:
@@ -167,8 +312,17 @@ def test_the_quiet_power_of_white_noise_is_its_variance_whatever_is_missing(sigm
     valid = np.ones(1200, bool)
     valid[300:480] = False
     weight = 0.5 * softened(valid).astype(np.float64)
-    powers = np.sum([quiet_power(sigma * rng.normal(size=1200), weight) for _ in range(60)], axis=0)
-    assert powers[0] / powers[1] == pytest.approx(sigma**2, rel=0.06)
+    assert _power(sigma * rng.normal(size=(60, 1200)), weight) == pytest.approx(sigma**2, rel=0.06)
+
+
+def test_the_quiet_power_of_scores_that_agree_is_their_covariance_matrix() -> None:
+    rng = np.random.default_rng(9)
+    covariance = np.array([[4.0, -1.2], [-1.2, 0.5]])
+    noise = np.linalg.cholesky(covariance) @ rng.normal(size=(200, 2, 1200))
+    told = [quiet_power(one, np.linspace(0, 1, 1200)) for one in noise]
+    found = np.sum([power for power, _ in told], axis=0) / np.sum([size for _, size in told])
+    scale = np.sqrt(np.outer(np.diag(covariance), np.diag(covariance)))
+    np.testing.assert_allclose(found / scale, covariance / scale, atol=0.05)
 
 
 def test_sound_that_paths_have_still_to_follow_is_not_taken_for_noise() -> None:
@@ -176,8 +330,7 @@ def test_sound_that_paths_have_still_to_follow_is_not_taken_for_noise() -> None:
     column = np.arange(1200)
     noise = rng.normal(size=(40, 1200))
     music = 3 * np.sin(2 * np.pi * column / 170 + rng.uniform(0, 6, (40, 1)))
-    powers = np.sum([quiet_power(one, np.ones(1200)) for one in noise + music], axis=0)
-    assert powers[0] / powers[1] < 1.3
+    assert _power(noise + music) < 1.3
 
 
 def test_columns_with_the_usual_texture_are_believed_and_no_others() -> None:

@@ -12,7 +12,20 @@ from gramoscope.conventions import INNER, OUTER, FloatArray
 from gramoscope.disc.formats import Cut
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.learning import Learning
-from gramoscope.pickup.texture.reading import Evidence, Rules, Stretch, clear_columns, evidence, read, settled, step
+from gramoscope.pickup.texture.likelihood import StripeStatistics
+from gramoscope.pickup.texture.reading import (
+    Evidence,
+    Model,
+    Rules,
+    Stretch,
+    clear_columns,
+    evidence,
+    read,
+    settled,
+    step,
+)
+from gramoscope.pickup.texture.spectrum import Band
+from gramoscope.pickup.texture.tone import Tone
 
 WIDTH = 800
 RULES = Rules()
@@ -127,6 +140,18 @@ def test_a_wall_without_support_takes_the_path_of_the_other() -> None:
 def test_walls_of_a_stereo_cut_are_left_alone() -> None:
     path = JITTER.copy()
     np.testing.assert_array_equal(settled(path, np.ones((2, WIDTH)), "stereo", RULES), path)
+
+
+def test_a_model_is_as_precise_as_all_its_stripes_together(layout: StripeLayout) -> None:
+    empty, share = np.zeros((1, 19, 19), np.float32), np.array([1.0, 0.0])
+    one, other = (
+        StripeStatistics(empty, empty, empty[:, 0, 0], share, answer, power, 0.0, empty[0, 0], columns)
+        for answer, power, columns in ((4.0, 8.0, 900), (0.5, 0.1, 7000))
+    )
+    model = Model(layout, Tone(), np.ones(1), 9, Band(), 64, (one, None, other))
+    # the error of a mean of n columns is √(J/n)/I
+    assert model.precision == pytest.approx(900 * 4.0**2 / 8 + 7000 * 0.5**2 / 0.1)
+    assert replace(model, stripes=(None, None)).precision == 0
 
 
 def _clear(stretch: Stretch, **changed: object) -> np.ndarray:

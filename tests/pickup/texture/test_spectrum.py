@@ -21,6 +21,8 @@ LENGTH = 1024
 WIDTH = 700
 LAG_PX = 80
 # symmetric, as a groove has no preferred direction: the cross-spectra are real
+SLOPE = np.array([[0.0, 0.7, -0.2], [-0.5, 0.0, 0.5], [0.3, -1.1, 0.4]], np.float32)
+"""By which the rows make their own derivative."""
 FILTERS = np.array([[0.1, 0.5, 1.0, 0.5, 0.1], [-0.3, 0.2, 0.8, 0.2, -0.3], [0.0, -0.4, 0.9, -0.4, 0.0]])
 
 
@@ -47,12 +49,13 @@ def _weight(rng: np.random.Generator, width: int = WIDTH) -> np.ndarray:
 def _summed(rng: np.random.Generator, windows: int) -> CrossSpectra:
     total = CrossSpectra(3, LENGTH)
     for _ in range(windows):
-        total.add(cross_spectra(_rows(rng), _weight(rng), length=LENGTH))
+        rows = _rows(rng)
+        total.add(cross_spectra(rows, SLOPE @ rows, _weight(rng), length=LENGTH))
     return total
 
 
 def test_known_cross_spectra_are_found_without_bias_whatever_is_missing() -> None:
-    found = _summed(np.random.default_rng(8), 300).spectra(largest_lag_px=LAG_PX, length=LENGTH)
+    found, _ = _summed(np.random.default_rng(8), 300).spectra(largest_lag_px=LAG_PX, length=LENGTH)
     true = _true_spectra(LENGTH)
     scale = np.sqrt(np.einsum("fi,fj->fij", *(2 * [np.diagonal(true, axis1=1, axis2=2)])))
     error = (found - true) / scale
@@ -62,11 +65,29 @@ def test_known_cross_spectra_are_found_without_bias_whatever_is_missing() -> Non
     np.testing.assert_array_equal(found, found.transpose(0, 2, 1))
 
 
+def test_the_change_of_rows_that_make_their_own_derivative_follows_from_their_spectra() -> None:
+    found, change = _summed(np.random.default_rng(8), 300).spectra(largest_lag_px=LAG_PX, length=LENGTH)
+    np.testing.assert_allclose(change, SLOPE @ found + found @ SLOPE.T, atol=1e-6 * np.abs(change).max())
+    true = SLOPE @ _true_spectra(LENGTH)
+    error = change - true - true.transpose(0, 2, 1)
+    assert np.abs(error.mean(axis=0)).max() < 0.006 * np.abs(true).max()
+    assert error.std() < 0.035 * np.abs(true).max()
+
+
+def test_the_change_is_what_a_small_move_does_to_the_spectra() -> None:
+    rng = np.random.default_rng(7)
+    rows, derivative, weight = _rows(rng), _rows(rng), _weight(rng)
+    lower, here, higher = (
+        cross_spectra(rows + move * derivative, derivative, weight, length=LENGTH) for move in (-0.1, 0.0, 0.1)
+    )
+    np.testing.assert_allclose(here.change, (higher.within - lower.within) / 0.2, atol=1e-4 * np.abs(here.change).max())
+
+
 def test_the_error_falls_as_the_root_of_the_columns() -> None:
     rng = np.random.default_rng(5)
     true = _true_spectra(LENGTH)
     few, many = (
-        np.mean([(_summed(rng, n).spectra(largest_lag_px=LAG_PX, length=LENGTH) - true).std() for _ in range(6)])
+        np.mean([(_summed(rng, n).spectra(largest_lag_px=LAG_PX, length=LENGTH)[0] - true).std() for _ in range(6)])
         for n in (4, 64)
     )
     assert few / many == pytest.approx(4, rel=0.2)
@@ -75,7 +96,8 @@ def test_the_error_falls_as_the_root_of_the_columns() -> None:
 def test_the_answer_comes_in_the_bins_of_any_transform() -> None:
     total = _summed(np.random.default_rng(2), 20)
     fine, coarse = (total.spectra(largest_lag_px=LAG_PX, length=n) for n in (1024, 256))
-    np.testing.assert_allclose(fine[::4], coarse, atol=1e-6 * np.abs(coarse).max())
+    for every, fourth in zip(fine, coarse, strict=True):
+        np.testing.assert_allclose(every[::4], fourth, atol=1e-6 * np.abs(fourth).max())
 
 
 @pytest.mark.parametrize(("lag", "share"), [(0, 1.0), (20, 1.0), (40, 1.0), (60, 0.5), (80, 0.0), (100, 0.0)])
@@ -83,9 +105,10 @@ def test_lags_count_fully_up_to_half_the_window_and_not_beyond_it(lag: int, shar
     rows = np.zeros((1, WIDTH), np.float32)
     rows[0, [200, 200 + lag]] = 1.0
     weight = np.ones(WIDTH, np.float32)
-    spectra = cross_spectra(rows, weight, length=LENGTH).spectra(largest_lag_px=LAG_PX, length=LENGTH)[:, 0, 0]
-    covariance = fft.irfft(spectra, LENGTH)[lag] * (WIDTH - lag)
-    assert covariance == pytest.approx(share, abs=0.04)
+    found = cross_spectra(rows, 3 * rows, weight, length=LENGTH).spectra(largest_lag_px=LAG_PX, length=LENGTH)
+    within, change = (fft.irfft(spectra[:, 0, 0], LENGTH)[lag] * (WIDTH - lag) for spectra in found)
+    assert within == pytest.approx(share, abs=0.04)
+    assert change == pytest.approx(6 * share, abs=0.24)
 
 
 def _power_laws() -> dict[str, Callable[[np.ndarray], np.ndarray]]:

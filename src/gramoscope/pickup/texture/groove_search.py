@@ -80,9 +80,10 @@ class GrooveSearch:
         How far a single wall may run from the common path.
     absent : float
         Sharpness below which a stripe that should be seen speaks against a path.
-    usual_swing_px, swing_cost : float
-        Displacements of that size cost so much sharpness, and others as their squares: where one stripe alone is seen it
-        is taken for the one that needs the smaller swing.
+    usual_swing_px, usual_drift_px, swing_cost : float
+        Displacements of that size, in the direction of the cut and in another one, cost so much sharpness, and others as
+        their squares: where one stripe alone is seen it is taken for the one that needs the smaller swing, and its
+        motion for one in the direction of the cut.
     """
 
     swing_px: float = 120.0
@@ -91,10 +92,12 @@ class GrooveSearch:
     wall_reach_px: float = 8.0
     absent: float = 0.2
     usual_swing_px: float = 200.0
+    usual_drift_px: float = 12.0
     swing_cost: float = 0.15
 
     def __post_init__(self) -> None:
         require(self.usual_swing_px > 0, f"a usual swing of {self.usual_swing_px} px", "above 0")
+        require(self.usual_drift_px > 0, f"a usual drift of {self.usual_drift_px} px", "above 0")
 
     def find(self, sharp: FloatArray, layout: StripeLayout, *, cut: Cut) -> tuple[FloatArray, FloatArray]:
         """Return where both walls run.
@@ -129,7 +132,9 @@ class GrooveSearch:
         lateral, vertical = (GRID_PX * np.arange(-int(r // GRID_PX), int(r // GRID_PX) + 1) for r in reach)
         # on a coarse grid a ridge is where any of its rows is
         wide = np.maximum(ridge, np.maximum(np.roll(ridge, 1, axis=1), np.roll(ridge, -1, axis=1)))
-        usual = (lateral[:, None] / self.usual_swing_px) ** 2 + (vertical / self.usual_swing_px) ** 2
+        used = [cut != "vertical", cut != "lateral"]
+        large = [self.usual_swing_px if use else self.usual_drift_px for use in used]
+        usual = (lateral[:, None] / large[0]) ** 2 + (vertical / large[1]) ** 2
         score = np.tile(-self.swing_cost * usual, (len(ridge), 1, 1))
         signs = wall_sign(layout.wall)
         stripes = zip(layout.rest_row, signs, layout.first_row, layout.last_row, layout.from_bottom_px, strict=True)
@@ -138,7 +143,6 @@ class GrooveSearch:
             depth = from_bottom - vertical
             seen = (rows >= low) & (rows <= high) & (depth > BOTTOM_PX) & (depth < layout.half_width_px)
             score[:, seen] += wide[:, rows[seen]] - self.absent
-        used = [cut != "vertical", cut != "lateral"]
         steps = np.array([1 if use else int(len(ridge) > 1) for use in used])
         # what the cut does not use changes slowly: a step of one grid point costs as much as a cell without its stripes
         costs = np.array([self.step_cost * GRID_PX if use else 1.0 for use in used])
