@@ -1,6 +1,6 @@
 """How well does each recipe read, and how well could it be read? Films scenes, plays them, compares with the truth.
 
-    python -m benchmarks.accuracy.readings [--recipe NAME]… [--only WORD] [--seconds 0.1] [--workdir DIR] [--table FILE]
+    python -m benchmarks.accuracy.readings [--recipe NAME]… [--only NAME,NAME] [--seconds 0.1] [--workdir DIR] [--table FILE]
 
 A tenth of a second of a scene needs 1.6 GB on disk (a film in colour or of a loud sound up to 4) and one to three minutes on
 two cores; with `--workdir` films are kept for the next time, else one at a time is on disk. The table is written after
@@ -171,15 +171,15 @@ COLUMNS = (
 )
 
 
-def rows(table: Table, recipes: list[str], only: str, seconds: float, workdir: Path | None) -> Iterator[list[str]]:
+def rows(table: Table, recipes: list[str], only: set[str], seconds: float, workdir: Path | None) -> Iterator[list[str]]:
     """Yield the rows that the table lacks, scene by scene, each filmed once."""
     for judged in PRACTICE:
         folder = SHARED / "captures" / judged.name
-        if only in judged.name and folder.is_dir():
+        if (not only or judged.name in only) and folder.is_dir():
             yield from _played(table, recipes, judged, folder)
     for case in CASES:
         wanted = [recipe for recipe in recipes if not table.has(case.name, recipe)]
-        if wanted and only in case.name and case.can_be_filmed:
+        if wanted and (not only or case.name in only) and case.can_be_filmed:
             yield from _filmed_and_played(table, wanted, case, seconds, workdir)
 
 
@@ -205,7 +205,7 @@ def _played(table: Table, recipes: list[str], judged: Judged, folder: Path) -> I
 def arguments() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--recipe", action="append", help=f"name or file; may be repeated; default {RECIPES}")
-    parser.add_argument("--only", default="", help="scenes whose name contains this")
+    parser.add_argument("--only", default="", help="scenes by name, with commas between them; all when left out")
     parser.add_argument("--seconds", type=float, default=0.1)
     parser.add_argument("--workdir", type=Path, help="keep films here, and use those that lie here")
     parser.add_argument("--table", type=Path, help="page to keep the rows in")
@@ -221,7 +221,7 @@ def main() -> int:
     known = Table(None, "", COLUMNS, rows={} if given.again else table.rows)
     if given.workdir is not None:
         given.workdir.mkdir(parents=True, exist_ok=True)
-    for cells in rows(known, recipes, given.only, given.seconds, given.workdir):
+    for cells in rows(known, recipes, set(filter(None, given.only.split(","))), given.seconds, given.workdir):
         print(" | ".join(cells), flush=True)
         table.add(cells)
     return 0

@@ -53,8 +53,8 @@ def test_what_the_table_holds_is_neither_filmed_nor_played_again(monkeypatch: py
     page.add(["physics", "best", "0.7"])
     page.add(["55mm", "best", "0.7"])
     page.add(["55mm", "seed-paper", "0.7"])
-    for word in ("physics", "55mm"):
-        for cells in readings.rows(page, ["best", "seed-paper"], word, 0.1, None):
+    for name in ("physics", "55mm"):
+        for cells in readings.rows(page, ["best", "seed-paper"], {name}, 0.1, None):
             page.add(cells)
     assert made == [("physics", "seed-paper")]
 

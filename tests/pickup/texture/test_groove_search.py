@@ -1,5 +1,6 @@
 """The coarse search on painted pictures: every path must be found within the reach of the exact reading, three rows."""
 
+from dataclasses import replace
 from itertools import pairwise, product
 
 import numpy as np
@@ -126,6 +127,22 @@ def test_a_vertical_groove_moves_its_walls_against_each_other() -> None:
     found, _ = _found(_painted(_both(_wave(5, 300), vertical)), "vertical")
     error = np.abs(found - _both(_wave(5, 300), vertical))
     assert np.quantile(error, 0.95) < EXACT_REACH_PX
+
+
+def test_the_motion_of_a_single_stripe_is_taken_for_one_in_the_direction_of_the_cut() -> None:
+    vertical = 54 + _wave(4, 91)
+    displacement = _both(np.zeros(CELLS), vertical)
+    # both deep stripes are gone, and the inner wall's shallow one is all that is left
+    sharp = _painted(displacement, hidden=(OUTER, slice(None)), stripes=replace(LAYOUT, first_row=_only(3)))
+    found, _ = _found(sharp, "vertical")
+    error = np.abs(found - displacement)
+    assert np.quantile(error[INNER], 0.95) < EXACT_REACH_PX
+    assert np.quantile(error[OUTER], 0.95) < EXACT_REACH_PX
+
+
+def _only(number: int) -> FloatArray:
+    """First rows of a layout in which no other stripe can be seen."""
+    return np.where(np.arange(LAYOUT.wall.size) == number, LAYOUT.first_row, HEIGHT)
 
 
 def test_a_stereo_groove_has_two_walls_of_their_own() -> None:
