@@ -55,7 +55,9 @@ def _summed(rng: np.random.Generator, windows: int) -> CrossSpectra:
 
 
 def test_known_cross_spectra_are_found_without_bias_whatever_is_missing() -> None:
-    found, _ = _summed(np.random.default_rng(8), 300).spectra(largest_lag_px=LAG_PX, length=LENGTH)
+    found, _ = _summed(np.random.default_rng(8), 300).spectra(
+        largest_lag_px=LAG_PX, change_lag_px=LAG_PX, length=LENGTH
+    )
     true = _true_spectra(LENGTH)
     scale = np.sqrt(np.einsum("fi,fj->fij", *(2 * [np.diagonal(true, axis1=1, axis2=2)])))
     error = (found - true) / scale
@@ -66,7 +68,9 @@ def test_known_cross_spectra_are_found_without_bias_whatever_is_missing() -> Non
 
 
 def test_the_change_of_rows_that_make_their_own_derivative_follows_from_their_spectra() -> None:
-    found, change = _summed(np.random.default_rng(8), 300).spectra(largest_lag_px=LAG_PX, length=LENGTH)
+    found, change = _summed(np.random.default_rng(8), 300).spectra(
+        largest_lag_px=LAG_PX, change_lag_px=LAG_PX, length=LENGTH
+    )
     np.testing.assert_allclose(change, SLOPE @ found + found @ SLOPE.T, atol=1e-6 * np.abs(change).max())
     true = SLOPE @ _true_spectra(LENGTH)
     error = change - true - true.transpose(0, 2, 1)
@@ -87,7 +91,12 @@ def test_the_error_falls_as_the_root_of_the_columns() -> None:
     rng = np.random.default_rng(5)
     true = _true_spectra(LENGTH)
     few, many = (
-        np.mean([(_summed(rng, n).spectra(largest_lag_px=LAG_PX, length=LENGTH)[0] - true).std() for _ in range(6)])
+        np.mean(
+            [
+                (_summed(rng, n).spectra(largest_lag_px=LAG_PX, change_lag_px=LAG_PX, length=LENGTH)[0] - true).std()
+                for _ in range(6)
+            ]
+        )
         for n in (4, 64)
     )
     assert few / many == pytest.approx(4, rel=0.2)
@@ -95,7 +104,7 @@ def test_the_error_falls_as_the_root_of_the_columns() -> None:
 
 def test_the_answer_comes_in_the_bins_of_any_transform() -> None:
     total = _summed(np.random.default_rng(2), 20)
-    fine, coarse = (total.spectra(largest_lag_px=LAG_PX, length=n) for n in (1024, 256))
+    fine, coarse = (total.spectra(largest_lag_px=LAG_PX, change_lag_px=LAG_PX, length=n) for n in (1024, 256))
     for every, fourth in zip(fine, coarse, strict=True):
         np.testing.assert_allclose(every[::4], fourth, atol=1e-6 * np.abs(fourth).max())
 
@@ -105,7 +114,9 @@ def test_lags_count_fully_up_to_half_the_window_and_not_beyond_it(lag: int, shar
     rows = np.zeros((1, WIDTH), np.float32)
     rows[0, [200, 200 + lag]] = 1.0
     weight = np.ones(WIDTH, np.float32)
-    found = cross_spectra(rows, 3 * rows, weight, length=LENGTH).spectra(largest_lag_px=LAG_PX, length=LENGTH)
+    found = cross_spectra(rows, 3 * rows, weight, length=LENGTH).spectra(
+        largest_lag_px=LAG_PX, change_lag_px=LAG_PX, length=LENGTH
+    )
     within, change = (fft.irfft(spectra[:, 0, 0], LENGTH)[lag] * (WIDTH - lag) for spectra in found)
     assert within == pytest.approx(share, abs=0.04)
     assert change == pytest.approx(6 * share, abs=0.24)

@@ -62,7 +62,8 @@ SLOPE_BETA = 6.0
 def sharp_slope() -> FloatArray:
     """Return the weights of x₁ − x₋₁ … x₇ − x₋₇ in a derivative that holds nearly up to half a cycle a row.
 
-    Within 4 % to a third of a cycle, 6 % to four tenths, and even. The slope of the sinc series, (−1)^(k+1)/k, under a Kaiser window, scaled to be exact for a straight line.
+    Within 4 % to a third of a cycle, 6 % to four tenths, and even. The slope of the sinc series, (−1)^(k+1)/k, under a
+    Kaiser window, scaled to be exact for a straight line.
     """
     k = np.arange(1, REACH + 1)
     taps = -((-1.0) ** k) / k * np.i0(SLOPE_BETA * np.sqrt(1 - (k / (REACH + 1)) ** 2))

@@ -64,6 +64,8 @@ class Learning:
         Rows of a window on each side of a stripe.
     largest_lag_px : int
         Lags up to here may carry correlation: the light of points far from the stripe reaches its rows in large discs.
+    change_lag_px : int
+        The same for how correlation changes when a path moves: what is left out costs little, and the rest is known better.
     band_low, band_high : float
         Frequencies along the groove that are used, cycles a pixel.
     loading : tuple of float
@@ -78,6 +80,7 @@ class Learning:
 
     half_px: int = 12
     largest_lag_px: int = 150
+    change_lag_px: int = 30
     band_low: float = 0.02
     band_high: float = 0.35
     loading: tuple[float, ...] = (0.03, 0.03, 0.01, 0.003, 0.001, 0.001, 0.001)
@@ -239,7 +242,9 @@ class Learning:
         for one, _, _ in sums:
             total.add(one)
         bins = blank.band.bins(blank.length)
-        c, change = total.spectra(largest_lag_px=self.largest_lag_px, length=blank.length)
+        c, change = total.spectra(
+            largest_lag_px=self.largest_lag_px, change_lag_px=self.change_lag_px, length=blank.length
+        )
         inverse, noise = precision(c, band=bins, loading=loading)
         row_power = np.sum([power for _, power, _ in sums], axis=0) / columns
         return StripeStatistics(

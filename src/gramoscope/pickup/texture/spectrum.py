@@ -105,13 +105,13 @@ class CrossSpectra:
         self.change += other.change
         self.weight += other.weight
 
-    def spectra(self, *, largest_lag_px: int, length: int) -> tuple[FloatArray, FloatArray]:
+    def spectra(self, *, largest_lag_px: int, change_lag_px: int, length: int) -> tuple[FloatArray, FloatArray]:
         """Return C_f and C′_f.
 
         Parameters
         ----------
-        largest_lag_px : int
-            The lag window is 1 to half of it and falls to zero as a cosine.
+        largest_lag_px, change_lag_px : int
+            For C and for C′: the lag window is 1 to half of it and falls to zero as a cosine.
         length : int
             Of the transform in whose bins the answer is wanted.
 
@@ -119,18 +119,18 @@ class CrossSpectra:
         -------
         C, change : float64 arrays, shape (length // 2 + 1, row, row)
         """
-        u = np.arange(largest_lag_px + 1) / (largest_lag_px + 1)
-        taper = np.where(u < 0.5, 1.0, 0.5 * (1 + np.cos(2 * np.pi * (u - 0.5))))
-        columns = np.maximum(fft.irfft(self.weight, self.length)[: u.size], 1.0)
 
-        def smoothed(sums: FloatArray) -> FloatArray:
+        def smoothed(sums: FloatArray, lag_px: int) -> FloatArray:
+            u = np.arange(lag_px + 1) / (lag_px + 1)
+            taper = np.where(u < 0.5, 1.0, 0.5 * (1 + np.cos(2 * np.pi * (u - 0.5))))
+            columns = np.maximum(fft.irfft(self.weight, self.length)[: u.size], 1.0)
             covariance = fft.irfft(sums, self.length, axis=0)[: u.size] * (taper / columns)[:, None, None]
             full = np.zeros((length, self.rows, self.rows))
             full[: u.size] = covariance
             full[-u.size + 1 :] = covariance[1:][::-1]
             return np.asarray(fft.rfft(full, axis=0).real)
 
-        return smoothed(self.within), smoothed(self.change)
+        return smoothed(self.within, largest_lag_px), smoothed(self.change, change_lag_px)
 
 
 def cross_spectra(window: Float32Array, derivative: Float32Array, weight: Float32Array, *, length: int) -> CrossSpectra:
