@@ -8,7 +8,7 @@ import pytest
 from gramoscope.apparatus.bench import Bench
 from gramoscope.conventions import INNER, OUTER
 from gramoscope.microscope.cover_glass import CoverGlass
-from gramoscope.pickup.texture.layout import StripeLayout, wall_sign
+from gramoscope.pickup.texture.layout import BOTTOM_PX, StripeLayout, wall_sign
 from gramoscope.simulation.scene import filming_bench
 
 BENCH = filming_bench(height_px=448)
@@ -98,3 +98,18 @@ def test_the_stripes_of_a_wall_are_those_of_that_wall() -> None:
 
 def test_a_groove_that_rises_moves_its_inner_wall_outwards_and_its_outer_wall_inwards() -> None:
     np.testing.assert_array_equal(wall_sign(np.array([INNER, OUTER])), [-1.0, 1.0])
+
+
+@pytest.mark.parametrize("lateral_px", [-20.0, 0.0, 20.0])
+def test_windows_stay_above_the_rounded_bottom_and_below_the_land(lateral_px: float) -> None:
+    layout = replace(
+        StripeLayout.of_bench(BENCH, edge_margin_px=6.0),
+        first_row=np.full(4, -1000.0),
+        last_row=np.full(4, 1000.0),
+    )
+    rise = np.arange(-80.0, 80.0)
+    rows = layout.rows(np.array([lateral_px - rise, lateral_px + rise]))
+    room = layout.from_bottom_px[:, None] - rise
+    expected = (room >= 12 + BOTTOM_PX) & (room <= layout.half_width_px - 12)
+    assert 0.3 < expected.mean() < 0.95
+    np.testing.assert_array_equal(layout.visible(rows, half_px=12), expected)

@@ -17,11 +17,8 @@ import numpy as np
 from gramoscope.conventions import INNER, OUTER, FloatArray
 from gramoscope.disc.formats import Cut
 from gramoscope.errors import require
-from gramoscope.pickup.texture.layout import StripeLayout, wall_sign
+from gramoscope.pickup.texture.layout import BOTTOM_PX, StripeLayout, wall_sign
 from gramoscope.pickup.texture.sharpness import ridges
-
-BOTTOM_PX = 8.0
-"""Nearer to the middle of the groove its rounded bottom leaves no wall to be sharp on."""
 
 
 @numba.njit(cache=True, nogil=True)

@@ -16,6 +16,9 @@ import numpy as np
 from gramoscope.apparatus.bench import Bench, Stripe
 from gramoscope.conventions import INNER, OUTER, BoolArray, FloatArray, IntArray
 
+BOTTOM_PX = 8.0
+"""Nearer to the middle of the groove its rounded bottom leaves no wall to be sharp on."""
+
 
 @dataclass(frozen=True, eq=False)
 class StripeLayout:
@@ -99,9 +102,17 @@ class StripeLayout:
         return self.rest_row[:, None] + displacement_px[self.wall]
 
     def visible(self, rows: FloatArray, *, half_px: float) -> BoolArray:
-        """Tell where windows of ± `half_px` rows about the stripes, shape (stripe, place), can be seen whole."""
+        """Tell where windows of ± `half_px` rows about the stripes, shape (stripe, place), show their wall and nothing else.
+
+        They must lie in the half of the picture that is sharp there, above the groove's rounded bottom, below the land.
+        """
         inside = (rows - half_px >= self.first_row[:, None]) & (rows + half_px <= self.last_row[:, None])
-        return np.asarray(inside)
+        moved = rows - self.rest_row[:, None]
+        walls = [moved[self.wall == wall] for wall in (INNER, OUTER)]
+        lateral = np.mean([wall[0] for wall in walls if len(wall)], axis=0)
+        from_middle = np.abs(rows - (self.middle_row + lateral))
+        on_wall = (from_middle - half_px >= BOTTOM_PX) & (from_middle + half_px <= self.half_width_px)
+        return np.asarray(inside & on_wall)
 
 
 def _all_stripes(bench: Bench) -> tuple[Stripe, ...]:
