@@ -110,7 +110,8 @@ class StripeLayout:
         moved = rows - self.rest_row[:, None]
         walls = [moved[self.wall == wall] for wall in (INNER, OUTER)]
         lateral = np.mean([wall[0] for wall in walls if len(wall)], axis=0)
-        from_middle = np.abs(rows - (self.middle_row + lateral))
+        beside = rows - (self.middle_row + lateral)
+        from_middle = np.where(self.wall[:, None] == INNER, beside, -beside)
         on_wall = (from_middle - half_px >= BOTTOM_PX) & (from_middle + half_px <= self.half_width_px)
         return np.asarray(inside & on_wall)
 
