@@ -84,7 +84,7 @@ def test_rows_are_places_at_rest_plus_the_displacement_of_their_wall() -> None:
 def test_a_window_is_seen_when_all_of_its_rows_are() -> None:
     layout = StripeLayout.of_bench(BENCH, edge_margin_px=0.0).of_wall(OUTER)
     edge = BENCH.glass_edge_row
-    rows = np.array([[0.0, 0.0], [edge - 12, edge - 11.9]])
+    rows = layout.rest_row[:, None] + np.array([edge - 12, edge - 11.9]) - layout.rest_row[1]
     np.testing.assert_array_equal(layout.visible(rows, half_px=12)[1], [True, False])
 
 
