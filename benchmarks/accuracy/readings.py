@@ -37,6 +37,10 @@ OCTAVES_HZ = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0)
 NOTHING = "–"
 
 
+ENDS_S = 0.002
+"""Left out at both ends: a passage cut out of a side begins and ends in the middle of a sound."""
+
+
 @dataclass(frozen=True)
 class Judged:
     """How a capture is judged.
@@ -54,10 +58,10 @@ class Judged:
     name: str
     scene: Scene | None = None
     band_hz: Band = (100.0, 10_000.0)
-    trim_s: float = 0.0
+    trim_s: float = ENDS_S
 
 
-PRACTICE = tuple(Judged(name, None, (200.0, 10_000.0), 0.002) for name in ("practice-clean", "practice-damaged"))
+PRACTICE = tuple(Judged(name, None, (200.0, 10_000.0)) for name in ("practice-clean", "practice-damaged"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,8 +236,8 @@ ABOUT = f"""# The readings, measured
 
     python -m benchmarks.accuracy.readings --table benchmarks/accuracy/readings.md
 
-Waveform against truth after taking out gain and delay (at most 1 ms) by least squares, 100 Hz … 10 kHz; `practice` captures
-200 Hz … 10 kHz without the first and last 2 ms. *unflagged*: the same outside all flagged samples. *bound*: the SNR that no
+Waveform against truth after taking out gain and delay (at most 1 ms) by least squares, 100 Hz … 10 kHz, `practice` captures
+200 Hz … 10 kHz, without the first and last 2 ms. *unflagged*: the same outside all flagged samples. *bound*: the SNR that no
 unbiased reading of the undamaged scene can exceed in the same band ([bound.py](bound.py)); for scenes with texture that is not
 Gaussian, the bound of a Gaussian one. SNR by octave in dB. *σ ÷ error*: rms of the claimed standard errors ÷ rms of the real
 error in full band, outside flagged samples; of the lateral motion for a stereo cut. For a stereo cut r, SNR and bound are
