@@ -4,20 +4,17 @@ A sharp stripe wanders across the rows as the groove does. A window of rows that
 and to a fraction of a pixel, shows the texture as if the groove were straight: only then are the statistics of its rows the
 same all along the passage. Filtering along the columns without following would smear by the groove's slope.
 
-Between rows the picture is interpolated by a Kaiser-windowed sinc; differences of the window's rows give how it would change if
-the path were moved across them.
+Between rows the picture is interpolated by a Kaiser-windowed sinc; the derivative along the rows tells how the window would
+change if the path were moved across them.
 """
 
 from __future__ import annotations
 
 import numba
 import numpy as np
-import numpy.typing as npt
 
 from gramoscope.conventions import FloatArray
-from gramoscope.pickup.texture.tone import Tone
-
-Float32Array = npt.NDArray[np.float32]
+from gramoscope.pickup.texture.tone import Float32Array, Tone
 
 TAPS = 10
 PHASES = 512

@@ -11,8 +11,8 @@ with C⁻¹ and C′ applied in the frequency domain: local in every column, wha
 derivative of −½ Σ_f x_fᴴ C_f⁻¹ x_f along the picture's own change, from which the camera's noise of the power N is left out, as
 only the texture x̂ moves with the groove. The second is the score of the Gaussian likelihood of the window, and efficient if
 the texture is Gaussian and C′ well known; the first needs no C′ and forgives more. How far either can be trusted is measured:
-with their answers I to a path that is moved and their real powers J, a matrix, the weights J⁻¹I make of both the best score.
-Its answer is Iᵀ J⁻¹ I, and so is its power; u/I estimates what is missing from the path, with the error √J/I.
+with their answers I to a path that is moved and their real powers J, a matrix, the weights J⁻¹I make of both the best score;
+u/I, with the I and J of that score, estimates what is missing from the path, with the error √J/I.
 """
 
 from __future__ import annotations
@@ -130,6 +130,8 @@ def witnesses(
 
 def best_shares(answers: FloatArray, powers: FloatArray) -> FloatArray:
     """Return how witnesses should take part in the score: J⁻¹I, none against its own word.
+
+    A fiftieth is added to the diagonal of J, so that two witnesses that say the same are not played off against each other.
 
     Parameters
     ----------
