@@ -22,10 +22,8 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from gramoscope.conventions import FloatArray
+from gramoscope.conventions import Float32Array, FloatArray
 from gramoscope.signal_path import FrameGroup, ImageArray, Texture
-
-Float32Array = npt.NDArray[np.float32]
 
 CONVERGED_PX = 1e-3
 """Steps of the shift search below this are no longer worth a round."""

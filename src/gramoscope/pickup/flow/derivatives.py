@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy import ndimage
 
+from gramoscope.conventions import Float32Array
 from gramoscope.pickup.registration import Canvas
-
-Float32Array = npt.NDArray[np.float32]
 
 FOUR_POINT = (np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / 12).astype(np.float32)
 """Central differences exact for polynomials up to the fourth degree (Barron, Fleet and Beauchemin, IJCV 12, 1994)."""

@@ -40,14 +40,11 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-import numpy.typing as npt
 from scipy import ndimage
 
-from gramoscope.conventions import FloatArray
+from gramoscope.conventions import Float32Array, FloatArray
 from gramoscope.errors import require
 from gramoscope.pickup.flow.derivatives import Derivatives
-
-Float32Array = npt.NDArray[np.float32]
 
 AVERAGE = np.array([[1, 2, 1], [2, 0, 2], [1, 2, 1]]) / 12
 """Horn and Schunck's average over the eight neighbours."""

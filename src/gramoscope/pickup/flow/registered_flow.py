@@ -13,13 +13,12 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from gramoscope.conventions import Float32Array
 from gramoscope.errors import require
 from gramoscope.pickup.flow.derivatives import Derivatives, group_derivatives, texture_contrast
 from gramoscope.pickup.flow.horn_schunck import Flow, FlowMethod
 from gramoscope.pickup.registration import pair_shift_px, register, textured_rows
 from gramoscope.signal_path import ImageArray
-
-Float32Array = npt.NDArray[np.float32]
 
 
 def common_step_px(images: ImageArray, *, expected_px: float = 0.0) -> float:

@@ -13,10 +13,9 @@ from typing import Any
 import numpy as np
 
 from gramoscope.apparatus.bench import Bench
-from gramoscope.conventions import INNER, MICROMETRES_PER_METRE, OUTER, FloatArray
+from gramoscope.conventions import INNER, MICROMETRES_PER_METRE, OUTER, Float32Array, FloatArray
 from gramoscope.disc.formats import Cut
 from gramoscope.pickup.cartridge import Spread
-from gramoscope.pickup.texture.following import Float32Array
 from gramoscope.pickup.texture.groove_search import GrooveSearch
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.reading import Model

@@ -13,8 +13,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from gramoscope.conventions import FloatArray
-from gramoscope.pickup.texture.tone import Float32Array, Tone
+from gramoscope.conventions import Float32Array, FloatArray
+from gramoscope.pickup.texture.tone import Tone
 
 TAPS = 10
 PHASES = 512

@@ -20,11 +20,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import fft
 
-from gramoscope.conventions import FloatArray, IntArray
+from gramoscope.conventions import Float32Array, FloatArray, IntArray
 from gramoscope.disc.formats import Cut
 from gramoscope.errors import require
 from gramoscope.pickup.cartridge import Spread
-from gramoscope.pickup.texture.following import GENTLE, SHARP, Float32Array
+from gramoscope.pickup.texture.following import GENTLE, SHARP
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.likelihood import (
     StripeStatistics,

@@ -22,8 +22,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import fft, ndimage
 
-from gramoscope.conventions import BoolArray, FloatArray
-from gramoscope.pickup.texture.following import GENTLE, REACH, Float32Array, across
+from gramoscope.conventions import BoolArray, Float32Array, FloatArray
+from gramoscope.pickup.texture.following import GENTLE, REACH, across
 from gramoscope.pickup.texture.spectrum import Band
 
 TAPER_PX = 16

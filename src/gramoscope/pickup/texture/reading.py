@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import ndimage
 
-from gramoscope.conventions import INNER, OUTER, BoolArray, FloatArray
+from gramoscope.conventions import INNER, OUTER, BoolArray, Float32Array, FloatArray
 from gramoscope.disc.formats import Cut
-from gramoscope.pickup.texture.following import GENTLE, Float32Array, follow
+from gramoscope.pickup.texture.following import GENTLE, follow
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.likelihood import StripeStatistics, believable, quiet_power, softened, witnesses
 from gramoscope.pickup.texture.spectrum import Band, filtered

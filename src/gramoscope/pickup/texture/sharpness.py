@@ -11,8 +11,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from gramoscope.conventions import FloatArray
-from gramoscope.pickup.texture.following import Float32Array
+from gramoscope.conventions import Float32Array, FloatArray
 
 CELL_PX = 8
 """Columns in a cell."""

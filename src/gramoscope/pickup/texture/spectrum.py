@@ -21,8 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import fft, signal
 
-from gramoscope.conventions import FloatArray
-from gramoscope.pickup.texture.following import Float32Array
+from gramoscope.conventions import Float32Array, FloatArray
 
 WHITENER_TAPS = 41
 

@@ -11,12 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from gramoscope.conventions import FloatArray
+from gramoscope.conventions import Float32Array, FloatArray
 from gramoscope.errors import require
-
-Float32Array = npt.NDArray[np.float32]
 
 
 @dataclass(frozen=True)
