@@ -243,7 +243,7 @@ Gaussian, the bound of a Gaussian one. SNR by octave in dB. *σ ÷ error*: rms o
 error in full band, outside flagged samples; of the lateral motion for a stereo cut. For a stereo cut r, SNR and bound are
 those of the worse channel; *separation*: power heard in the driven channel ÷ that in the other, noise included, or with both
 driven by what leaks between them. *s*: what is compared, by `--seconds` less the ends: 0.1 for
-physics, 0.06 for the other films. *played in s*: on two cores, learning included.
+physics and polished, 0.06 for the other films. *played in s*: on two cores, learning included.
 
 Scenes are filmed by our simulator; the `practice` captures were made by an independent renderer.
 
