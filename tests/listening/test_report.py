@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -54,6 +57,23 @@ def test_an_interrupted_file_vanishes(tmp_path: Path) -> None:
 
     with pytest.raises(KeyboardInterrupt):
         interrupt()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("moment", ["touch", "replace"])
+def test_ctrl_c_just_when_a_file_is_made_or_put_in_place_leaves_no_half_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moment: str
+) -> None:
+    really = getattr(Path, moment)
+
+    def pressed(path: Path, *arguments: Any) -> None:
+        if moment == "touch":
+            really(path)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(Path, moment, pressed)
+    with pytest.raises(KeyboardInterrupt):
+        write_json(tmp_path / "report.json", {"a": 1})
     assert list(tmp_path.iterdir()) == []
 
 

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from gramoscope.errors import OutputError
+from gramoscope.interruption import ctrl_c_waits
 
 _NEEDED = "a folder that exists, that you may write in, with space for the results"
 _REMEDIES: dict[int, str] = {
@@ -113,13 +114,18 @@ def written_whole(path: Path) -> Iterator[Path]:
     OutputError
         If the file cannot be written.
     """
-    temporary = create_temporary(path)
+    try:
+        with ctrl_c_waits():
+            temporary = create_temporary(path)
+    except KeyboardInterrupt:
+        temporary_sibling(path).unlink(missing_ok=True)
+        raise
     try:
         yield temporary
+        put_in_place(temporary, path)
     except OSError as error:
         temporary.unlink(missing_ok=True)
         raise output_error(path, error.strerror or str(error), number=error.errno) from error
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
-    put_in_place(temporary, path)
