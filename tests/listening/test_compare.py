@@ -297,3 +297,14 @@ def test_pearson_agrees_with_numpy_and_knows_no_constant() -> None:
     a, b = _noise(1)[:500] + 3, _noise(2)[:500] - 7
     assert pearson_r(a, b) == pytest.approx(float(np.corrcoef(a, b)[0, 1]), abs=1e-12)
     assert np.isnan(pearson_r(a, np.full(500, 2.0)))
+
+
+def test_what_is_trimmed_does_not_ring_into_the_rest() -> None:
+    rng = np.random.default_rng(4)
+    sound = np.cumsum(rng.standard_normal(4800))
+    copy = sound + 1e-3 * np.std(sound) * rng.standard_normal(4800)
+    spoilt = copy.copy()
+    spoilt[[0, 1, -1]] += 3 * np.std(sound)
+    whole = compare(sound, 96e3, copy, 96e3, trim_s=0.002, max_delay_s=0)
+    ends = compare(sound, 96e3, spoilt, 96e3, trim_s=0.002, max_delay_s=0)
+    assert ends.snr_db == pytest.approx(whole.snr_db, abs=0.1)

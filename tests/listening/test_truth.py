@@ -113,3 +113,14 @@ def test_the_practice_capture_has_the_sound_it_says() -> None:
     sound = truth_sound(PRACTICE, rate_hz=192_000.0)
     assert len(sound) / 192_000 == pytest.approx(seconds, abs=1e-5)
     assert np.max(np.abs(sound)) == pytest.approx(loudest, rel=0.02)
+
+
+def test_a_truth_that_begins_loud_does_not_ring_at_its_ends(tmp_path: Path) -> None:
+    arc = np.arange(8000) * 0.4
+    speed = 0.9e6
+    lateral = 2e5 + 3e4 * np.sin(2 * np.pi * 900 * arc / speed)
+    np.savez(tmp_path / "t.npz", arc_um=arc, lateral_um_s=lateral, vertical_um_s=0 * lateral, speed_um_s=speed)
+    heard = truth_sound(tmp_path / "t.npz", rate_hz=96_000.0, cut="lateral")
+    expected = 0.2 + 0.03 * np.sin(2 * np.pi * 900 * np.arange(len(heard)) / 96e3)
+    np.testing.assert_allclose(heard, expected, atol=2e-3)
+    np.testing.assert_allclose(heard[12:-12], expected[12:-12], atol=3e-4)

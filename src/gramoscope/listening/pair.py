@@ -115,7 +115,7 @@ class Pairing:
     max_delay_s : float
         Largest delay looked for, at most a quarter of the shorter sound; 0 takes the sounds as they lie.
     trim_s : float
-        To leave out at each end of the span that both share.
+        To leave out at each end of the span that both share: there both sounds are faded before they are filtered.
     """
 
     band_hz: Band = (200.0, 10_000.0)
@@ -206,9 +206,10 @@ class Pairing:
         used[:trim] = False
         used[len(used) - trim :] = False
         self._require_length(np.count_nonzero(used) / rate_hz, rate_hz=rate_hz)
+        fade = _fade(len(used), trim)
         return Span(
-            a=band_passed(cut_a, rate_hz=rate_hz, band_hz=band_hz),
-            b=band_passed(cut_b, rate_hz=rate_hz, band_hz=band_hz, advance_s=advance_s),
+            a=band_passed(fade * cut_a, rate_hz=rate_hz, band_hz=band_hz),
+            b=band_passed(fade * cut_b, rate_hz=rate_hz, band_hz=band_hz, advance_s=advance_s),
             used=used,
             start_s=first / rate_hz,
         )
@@ -231,6 +232,12 @@ class Pairing:
                 f"{needed_s * 1e3:.2f} ms: a period of the lowest frequency, and {_FEWEST_SAMPLES} samples",
                 "give longer sounds, trim or mask less, or raise the lower edge of the band",
             )
+
+
+def _fade(count: int, trim: int) -> FloatArray:
+    """Rise over the trimmed head and fall over the trimmed tail, so that what is left out does not ring into the rest."""
+    rise = np.sin(np.pi / 2 * np.arange(trim) / max(trim, 1)) ** 2
+    return np.concatenate([rise, np.ones(count - 2 * trim), rise[::-1]])
 
 
 def at_rate(samples: FloatArray, rate_hz: float, new_rate_hz: float) -> FloatArray:

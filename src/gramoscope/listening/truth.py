@@ -146,5 +146,9 @@ def _in_time(velocity: FloatArray, time_s: FloatArray, *, rate_hz: float) -> Flo
     grid_s = np.arange(0, round(float(time_s[-1]) * dense_hz) + 1) / dense_hz
     channels = velocity.reshape(len(velocity), -1).T
     dense = np.stack([np.interp(grid_s, time_s, channel) for channel in channels], axis=1)
-    resampled = np.asarray(soxr.resample(dense, dense_hz, rate_hz, quality="VHQ"), np.float64)
+    # beyond the ends the resampler hears silence and would ring: a straight line from end to end goes round it
+    slope = (dense[-1] - dense[0]) / max(len(dense) - 1, 1)
+    bent = dense - (dense[0] + slope * np.arange(len(dense))[:, None])
+    resampled = np.asarray(soxr.resample(bent, dense_hz, rate_hz, quality="VHQ"), np.float64)
+    resampled += dense[0] + slope * (np.arange(len(resampled)) * dense_hz / rate_hz)[:, None]
     return resampled if velocity.ndim == 2 else resampled.reshape(-1)
