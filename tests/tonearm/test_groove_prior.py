@@ -1,26 +1,34 @@
 """The process that a groove is taken for: exact steps, its spectrum, its bends."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from gramoscope.tonearm.groove_prior import BEND_M, SLOPE, GroovePrior, start, taylor
+from gramoscope.tonearm.groove_prior import BEND_M, BODY, SLOPE, WIDE, GroovePrior, start, taylor
 from gramoscope.tonearm.small_matrices import STATES
 
 STEP_M = 3.1e-6
-PRIORS = [GroovePrior(2.1e4, 4.7e4), GroovePrior(2e3, 4e5), GroovePrior(7e3, 6.6e3), GroovePrior(1.3e5, 4e5)]
+PRIORS = [
+    GroovePrior(2.1e4, 4.7e4, 6e4, 0.01),
+    GroovePrior(2e3, 4e5, 3.3e4, 0.3),
+    GroovePrior(7e3, 6.6e3, 8e4, 0.1),
+    GroovePrior(1.3e5, 4e5, 7e4, 0.001),
+]
 
 
 def _spectrum(prior: GroovePrior) -> tuple[np.ndarray, np.ndarray]:
-    """Wave numbers and the share of the variance at each."""
+    """Wave numbers and the variance of the slope at each, for a body of variance 1."""
     k = np.geomspace(1.0, 1e8, 400_001)
-    density = 1 / ((k**2 + prior.corner_per_m**2) ** 2 * (k**2 + prior.cutoff_per_m**2) ** 3)
-    weight = density * np.gradient(k)
-    return k, weight / weight.sum()
+    body = np.gradient(k) / ((k**2 + prior.corner_per_m**2) ** 2 * (k**2 + prior.cutoff_per_m**2) ** 3)
+    wide = np.gradient(k) / (k**2 + prior.width_per_m**2) ** 2
+    return k, body / body.sum() + prior.wide_share**2 * wide / wide.sum()
 
 
 def _in_other_steps(step_m: float) -> np.ndarray:
     """Turns a state in steps of one length into one in steps of `STEP_M`."""
-    return np.diag((STEP_M / step_m) ** np.arange(STATES))
+    powers = np.r_[np.arange(WIDE), 1, 2]
+    return np.diag((STEP_M / step_m) ** powers)
 
 
 @pytest.mark.parametrize("prior", PRIORS)
@@ -45,7 +53,8 @@ def test_a_groove_at_rest_stays_as_it_is(prior: GroovePrior) -> None:
     later = a[1:, 1:] @ rest @ a[1:, 1:].T + q[1:, 1:]
     size = np.sqrt(np.outer(np.diag(rest), np.diag(rest)))
     np.testing.assert_allclose(later / size, rest / size, atol=1e-9)
-    assert np.sqrt(rest[0, 0]) / STEP_M == pytest.approx(1.0, rel=1e-12)
+    assert np.sqrt(rest[BODY - 1, BODY - 1]) / STEP_M == pytest.approx(1.0, rel=1e-12)
+    assert np.sqrt(rest[WIDE - 1, WIDE - 1]) / STEP_M == pytest.approx(prior.wide_share, rel=1e-12)
 
 
 @pytest.mark.parametrize("prior", PRIORS)
@@ -53,13 +62,14 @@ def test_slopes_hang_together_as_their_spectrum_says(prior: GroovePrior) -> None
     k, weight = _spectrum(prior)
     rest = prior.at_rest(STEP_M)
     a, _ = prior.steps(STEP_M)
-    covariance, moved = rest.copy(), rest
+    moved, slope = rest, SLOPE[1:]
     for lag in range(1, 6):
         moved = a[1:, 1:] @ moved
         expected = (weight * np.cos(k * lag * STEP_M)).sum()
-        assert moved[0, 0] / covariance[0, 0] == pytest.approx(expected, abs=1e-4)
-    # variance of the change of slope: −1/2 of the second moment
-    assert rest[1, 1] / STEP_M**2 == pytest.approx((weight * (k * STEP_M) ** 2).sum(), rel=1e-3)
+        assert slope @ moved @ slope / STEP_M**2 == pytest.approx(expected, abs=1e-4)
+    # variance of the change of slope: the second moment
+    bends = rest[BODY, BODY] + rest[WIDE, WIDE]
+    assert bends / STEP_M**2 == pytest.approx((weight * (k * STEP_M) ** 2).sum(), rel=1e-3)
 
 
 @pytest.mark.parametrize("prior", PRIORS)
@@ -68,7 +78,7 @@ def test_the_bend_of_a_groove_is_that_of_its_spectrum(prior: GroovePrior, step_m
     k, weight = _spectrum(prior)
     expected = np.sqrt((weight * 16 * np.sin(k * BEND_M / 2) ** 4 / k**2).sum()) / BEND_M
     assert prior.bend(step_m) == pytest.approx(expected, rel=1e-3)
-    louder = GroovePrior(prior.corner_per_m, prior.cutoff_per_m, share=1.7, floor=0.001)
+    louder = replace(prior, share=1.7, floor=0.001)
     assert louder.bends(0.02) == pytest.approx(1.7 * 0.02)
     assert louder.bends(0.0) == 0.001
 
@@ -95,5 +105,5 @@ def test_taylors_rows_lead_to_the_places_between() -> None:
     row = taylor(np.array([fraction, -0.2]))
     size = np.r_[0.0, 0.04 * np.sqrt(np.diag(prior.at_rest(STEP_M)))]
     assert np.abs((row[0] - exact[0]) * size).max() < 1e-11
-    assert row[1, SLOPE] == -0.2
-    assert row[1, 2] == pytest.approx(0.02)
+    assert row[1, BODY] == row[1, WIDE] == -0.2
+    assert row[1, BODY + 1] == row[1, WIDE + 1] == pytest.approx(0.02)

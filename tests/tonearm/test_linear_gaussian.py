@@ -18,12 +18,12 @@ from gramoscope.tonearm.linear_gaussian import (
 from gramoscope.tonearm.small_matrices import STATES
 
 STEP_M = 3.1e-6
-LATERAL, VERTICAL = GroovePrior(2.1e4, 4.7e4), GroovePrior(6e3, 2.2e4)
+LATERAL, VERTICAL = GroovePrior(2.1e4, 4.7e4, 6e4, 0.1), GroovePrior(6e3, 2.2e4, 5e4, 0.02)
 SIGMAS = np.array([0.04, 0.013])
 PLACE_SIGMA_M = 4e-6
 BINS = 60
 ROWS = np.eye(2 * STATES)
-PLACES, SLOPES = np.array([0, STATES]), np.array([SLOPE, STATES + SLOPE])
+PLACES, SLOPES = ROWS[[0, STATES]], np.kron(np.eye(2), SLOPE)
 
 
 def _moves(bins: int = BINS, scale: float = 1.0) -> Moves:
@@ -60,9 +60,11 @@ def _place_covariance(prior: GroovePrior, sigma: float, bins: np.ndarray) -> np.
     # ∫∫ of the slope's covariance, by the midpoint rule on a grid twenty times finer
     arc = (np.arange((bins.max()) * fine) + 0.5) * STEP_M / fine
     k = (np.arange(12_000) + 0.5) * 120.0
-    density = 1 / ((k**2 + prior.corner_per_m**2) ** 2 * (k**2 + prior.cutoff_per_m**2) ** 3)
+    body = 1 / ((k**2 + prior.corner_per_m**2) ** 2 * (k**2 + prior.cutoff_per_m**2) ** 3)
+    wide = 1 / (k**2 + prior.width_per_m**2) ** 2
+    density = body / body.sum() + prior.wide_share**2 * wide / wide.sum()
     lag = np.arange(arc.size) * STEP_M / fine
-    correlation = np.array([(density * np.cos(k * x)).sum() for x in lag]) / density.sum()
+    correlation = np.array([(density * np.cos(k * x)).sum() for x in lag])
     index = np.abs(np.arange(arc.size)[:, None] - np.arange(arc.size)[None, :])
     both = np.cumsum(np.cumsum(correlation[index], axis=0), axis=1) * (STEP_M / fine) ** 2 * sigma**2
     padded = np.pad(both, ((1, 0), (1, 0)))
@@ -113,11 +115,11 @@ def test_the_distance_of_a_reading_is_that_from_all_others(number: int, left_out
     # what the others say of h·x: ask for it as a reading that knows nothing
     weak = np.where(others, readings.variance, 1e-6)
     asking = replace(readings, variance=weak, gate_variance=weak)
-    smoothed = backward(moves, asking, forward(moves, asking, _begin()), wanted=np.arange(2 * STATES))
+    smoothed = backward(moves, asking, forward(moves, asking, _begin()), wanted=ROWS)
     plain = backward(moves, rest, forward(moves, rest, _begin()), wanted=PLACES)
     k = readings.bin[number]
-    np.testing.assert_allclose(smoothed.mean[:, PLACES], plain.mean, atol=1e-12)
-    assert np.all(smoothed.sigma[:, PLACES] <= plain.sigma * (1 + 1e-6))
+    np.testing.assert_allclose(smoothed.mean[:, [0, STATES]], plain.mean, atol=1e-12)
+    assert np.all(smoothed.sigma[:, [0, STATES]] <= plain.sigma * (1 + 1e-6))
     expected = readings.h[number] @ smoothed.mean[k]
     error = _sigma_of(moves, rest, readings.h[number], int(k))
     assert found[number] == pytest.approx(
@@ -139,7 +141,7 @@ def _sigma_of(moves: Moves, readings: Readings, h: np.ndarray, k: int) -> float:
     )
     filtered = forward(moves, more, _begin(), allowed=order != order.size - 1)
     far = backward(moves, more, filtered, wanted=PLACES).distance[np.argmax(order == order.size - 1)]
-    plain = backward(moves, readings, forward(moves, readings, _begin()), wanted=np.arange(2 * STATES))
+    plain = backward(moves, readings, forward(moves, readings, _begin()), wanted=ROWS)
     return float(np.sqrt((h @ plain.mean[k] / far) ** 2 - variance))
 
 

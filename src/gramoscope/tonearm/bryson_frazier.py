@@ -20,7 +20,7 @@ import numba
 import numpy as np
 from scipy import linalg
 
-from gramoscope.conventions import FloatArray, IntArray
+from gramoscope.conventions import FloatArray
 from gramoscope.tonearm.linear_gaussian import Filtered, FilterState, Moves, Readings
 from gramoscope.tonearm.small_matrices import STATES, block_sandwich, block_vector, dot, times
 
@@ -83,27 +83,27 @@ def _smooth(at, model, places, h, value, variance, gate_variance, used, nu, spre
         for i in range(j + 1, last + 1):
             if not used[i]:
                 off[i] = _far(h[i], value[i], gate_variance[i], means[k], covs[k], r, n, one, two)
-        for i in range(want.size):
-            w = want[i]
-            mean[k, i] = means[k, w] + dot(covs[k, w], r)
-            sigma[k, i] = np.sqrt(max(covs[k, w, w] - times(n, covs[k, w], one), 0.0))
+        for i in range(want.shape[0]):
+            before = times(covs[k], want[i], one)
+            mean[k, i] = dot(want[i], means[k]) + dot(one, r)
+            sigma[k, i] = np.sqrt(max(before - times(n, one, two), 0.0))
 
 
-def backward(moves: Moves, readings: Readings, filtered: Filtered, *, wanted: IntArray) -> Smoothed:
+def backward(moves: Moves, readings: Readings, filtered: Filtered, *, wanted: FloatArray) -> Smoothed:
     """Smooth what was filtered.
 
     Parameters
     ----------
     moves, readings, filtered
         What went into `forward`, and what came out.
-    wanted : int64 array, shape (wanted,)
-        Which parts of the state are asked for.
+    wanted : float64 array, shape (wanted, block · n)
+        Rows: what is asked for, times the state.
 
     Returns
     -------
     Smoothed
     """
-    shape = (moves.model.size, wanted.size)
+    shape = (moves.model.size, wanted.shape[0])
     mean, sigma, distance = np.empty(shape), np.empty(shape), np.empty(readings.value.size)
     _smooth(
         np.ascontiguousarray(moves.a.swapaxes(-1, -2)), moves.model, readings.bin, readings.h, readings.value,
@@ -114,7 +114,7 @@ def backward(moves: Moves, readings: Readings, filtered: Filtered, *, wanted: In
 
 
 def smooth_reference(
-    moves: Moves, readings: Readings, begin: FilterState, *, wanted: IntArray
+    moves: Moves, readings: Readings, begin: FilterState, *, wanted: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return mean and standard error of the wanted parts of the state by Kalman, Rauch, Tung and Striebel.
 
@@ -141,4 +141,4 @@ def smooth_reference(
         p = filtered[k][1] + gain @ (p - predicted[k + 1][1]) @ gain.T
         smoothed.append((m, p))
     means, covariances = (np.array(values) for values in zip(*smoothed[::-1], strict=True))
-    return means[:, wanted], np.sqrt(covariances[:, wanted, wanted])
+    return means @ wanted.T, np.sqrt(np.einsum("wi,kij,wj->kw", wanted, covariances, wanted))

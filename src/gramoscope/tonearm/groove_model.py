@@ -45,8 +45,8 @@ NORMAL_MEDIAN = 0.455
 """Median of the square of a normal number."""
 ROUNDS = 4
 """At most so often is looked again which readings are outliers."""
-SLOPES = np.array([SLOPE, STATES + SLOPE])
-"""Where the lateral and the vertical slope (times the step) stand in the state."""
+SLOPES = np.kron(np.eye(2), SLOPE)
+"""The lateral and the vertical slope (times the step) are these rows times the state."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +59,10 @@ class GrooveModel:
     slowest_per_m : float
         The least λ: what forgets most slowly.
     sigma : float64 array, shape (2,)
-        Of the slopes.
-    a, q : float64 arrays, shape (2, 6, 6)
+        Of the slopes (of their bodies).
+    a, q : float64 arrays, shape (2, 8, 8)
         One step of the grid.
-    covariance : float64 array, shape (12, 12)
+    covariance : float64 array, shape (16, 16)
         Of the state before anything was seen.
     agitation : float64 array, shape (bin,)
         How many times q the noise has, from `from_bin` on; once, where it ends.
@@ -85,9 +85,9 @@ class Beliefs:
     ----------
     priors : (GroovePrior, GroovePrior)
         Lateral and vertical.
-    a, q : float64 arrays, shape (2, 6, 6)
-        For σ = 1.
-    at_rest : float64 array, shape (2, 5, 5)
+    a, q : float64 arrays, shape (2, 8, 8)
+        For σ = 1, the standard deviation of a body.
+    at_rest : float64 array, shape (2, 7, 7)
         The same.
     sigma_of_bend : float64 array, shape (2,)
     """

@@ -1,22 +1,22 @@
 """What is believed of a groove before it is seen: its slope is coloured noise, its place the integral of that.
 
-The slope u = da/ds is taken for a stationary Gaussian process with the spectral density
+The slope da/ds = u + v is taken for the sum of two stationary Gaussian processes, a *body* u and a weaker, *wide* v:
 
-    S(k) = q / ((k² + λ²)² (k² + μ²)³),        q such that var u = σ²:
+    S_u(k) = q_u / ((k² + λ²)² (k² + μ²)³),     S_v(k) = q_v / (k² + ν²)².
 
-flat up to the corner λ, then falling by 12 dB an octave, and by 30 dB an octave beyond the cut-off μ, as everything does that
-a cutter has cut. It obeys (d/ds + λ)² (d/ds + μ)³ u = white noise of density q.
+The body is flat up to the corner λ, then falls by 12 dB an octave, and by 30 dB an octave beyond the cut-off μ, as everything
+does that a cutter has cut. How steeply it falls matters more than its shape where the groove is well seen, for above the
+frequency where the readings drown in their own noise the prior has the word. Errors of places that are white make errors of
+velocity that rise as k², cut off where S falls below them; a smoother that believes S ~ k^(−2p) there while nothing is there
+claims errors √(n/(n−1)) too large, n = (2p + 2)/3: by 1.41 for Matérn's process of order 3/2, by 1.15 for the body. And a
+groove rougher than the prior gets errors that are claimed too small: consonants, cymbals and surface lie 30 … 45 dB below
+the music's strongest octaves, reach far beyond them, and where they drown their power belongs into the error bar. They are
+what v is for. With λ far below μ the body is nearly Matérn's process of order 3/2, with both together that of order 9/2, and
+the capture chooses.
 
-How steeply S falls matters more than its shape where the groove is well seen, for above the frequency where the readings
-drown in their own noise the prior has the word. Errors of places that are white make errors of velocity that rise as k²,
-cut off where S falls below them; a smoother that believes S ~ k^(−2p) there while nothing is there claims errors √(n/(n−1))
-too large, n = (2p + 2)/3: by 1.41 for Matérn's process of order 3/2, by 1.15 for this one. And a groove rougher than the
-prior gets errors that are claimed too small. With λ far below μ this process is nearly that of Matérn of order 3/2, with both
-together that of order 9/2, and the capture chooses.
-
-The state is (a, u, u′, …, u⁗), each derivative times the power of the grid's step Δ that makes it a length: it means the
-same whatever the prior is, and its parts are of like size. Over one step it moves by A = exp(F) with noise of covariance
-Q = ∫₀¹ exp(Ft) L q Lᵀ exp(Ft)ᵀ dt: Taylor's series over a short step (dQ/dt = FQ + QFᵀ + L q Lᵀ), then doubled by
+The state is (a, u, u′, …, u⁗, v, v′), each derivative times the power of the grid's step Δ that makes it a length: it means
+the same whatever the prior is, and its parts are of like size. Over one step it moves by A = exp(F) with noise of covariance
+Q = ∫₀¹ exp(Ft) W exp(Ft)ᵀ dt: Taylor's series over a short step (dQ/dt = FQ + QFᵀ + W), then doubled by
 Q ← Q + A Q Aᵀ, A ← A² as often as needed. Doubled until A is nothing, the same gives the covariance at rest.
 """
 
@@ -31,12 +31,15 @@ import numpy as np
 from gramoscope.conventions import FloatArray
 from gramoscope.tonearm.small_matrices import STATES
 
-ORDER = STATES - 1
-"""Poles of the slope: five."""
-CORNER_POLES = 2
-CUTOFF_POLES = ORDER - CORNER_POLES
-SLOPE = 1
-"""Where the slope (times Δ) stands in the state."""
+CORNER_POLES, CUTOFF_POLES, WIDE_POLES = 2, 3, 2
+ORDER = CORNER_POLES + CUTOFF_POLES
+"""Poles of u."""
+BODY, WIDE = 1, 1 + ORDER
+"""Where u and v (times Δ) stand in the state."""
+assert STATES == 1 + ORDER + WIDE_POLES
+SLOPE = np.zeros(STATES)
+"""The slope (times Δ) is this row times the state."""
+SLOPE[[BODY, WIDE]] = 1.0
 BEND_M = 50e-6
 """ℓ, over which a bend is measured."""
 TERMS = 32
@@ -51,8 +54,10 @@ class GroovePrior:
 
     Attributes
     ----------
-    corner_per_m, cutoff_per_m : float
-        λ and μ.
+    corner_per_m, cutoff_per_m, width_per_m : float
+        λ, μ and ν.
+    wide_share : float
+        √(var v / var u).
     share : float
         How much the groove bends, standard deviation, for each unit of the *level* by which loud and soft are told
         (`tonearm.level`); about one.
@@ -62,6 +67,8 @@ class GroovePrior:
 
     corner_per_m: float
     cutoff_per_m: float
+    width_per_m: float
+    wide_share: float
     share: float = 1.0
     floor: float = 0.0
 
@@ -70,43 +77,58 @@ class GroovePrior:
         return max(self.share * level, self.floor)
 
     def steps(self, step_m: float) -> tuple[FloatArray, FloatArray]:
-        """Return A and Q for one step of the grid, shape (6, 6) each, the state in metres and σ = 1."""
-        drift, density, _ = self._process(step_m)
-        a, q = one_step(drift)
-        return a, density * q
+        """Return A and Q for one step of the grid, shape (8, 8) each, the state in metres and var u = 1."""
+        drift, noise, _ = self._process(step_m)
+        return one_step(drift, noise)
 
     def at_rest(self, step_m: float) -> FloatArray:
-        """Return the covariance of slope and its derivatives before anything was seen, shape (5, 5), for σ = 1."""
+        """Return the covariance of all but the place before anything was seen, shape (7, 7), for var u = 1."""
         return self._process(step_m)[2]
 
     def bend(self, step_m: float) -> float:
-        """Return the standard deviation of (a(s + ℓ) − 2a(s) + a(s − ℓ))/ℓ, ℓ = `BEND_M`, for σ = 1."""
-        drift, density, at_rest = self._process(step_m)
+        """Return the standard deviation of (a(s + ℓ) − 2a(s) + a(s − ℓ))/ℓ, ℓ = `BEND_M`, for var u = 1."""
+        drift, noise, at_rest = self._process(step_m)
         lag = BEND_M / step_m
-        a, q = one_step(lag * drift)
-        q = density * lag * q
+        a, q = one_step(lag * drift, lag * noise)
         later = a[0] - 2 * np.eye(STATES)[0]
         now = (later @ a)[1:]
         variance = now @ at_rest @ now + later @ q @ later + q[0, 0]
         return float(np.sqrt(variance) / BEND_M)
 
-    def _process(self, step_m: float) -> tuple[FloatArray, float, FloatArray]:
-        """F, density of the noise, and covariance at rest of (u, u′, …, u⁗), in steps and for σ = 1."""
-        corner, cutoff = self.corner_per_m * step_m, self.cutoff_per_m * step_m
-        # in units in which the poles lie about one, so that nothing is lost between u and u⁗
-        unit = (corner**CORNER_POLES * cutoff**CUTOFF_POLES) ** (1 / ORDER)
-        moving = np.diag(np.ones(ORDER - 1), 1)
-        moving[-1] = _friction(corner / unit, cutoff / unit)
-        resting = at_rest(moving)
-        power = step_m**2 / resting[0, 0]
-        scale = unit ** np.arange(ORDER)
-        drift = np.diag(np.ones(ORDER), 1)
-        drift[1:, 1:] = unit * moving * np.outer(scale, 1 / scale)
-        return drift, float(power * unit * scale[-1] ** 2), power * resting * np.outer(scale, scale)
+    def _process(self, step_m: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """F, density of the noise, and covariance at rest of (u, …, u⁗, v, v′), in steps and for var u = 1."""
+        drift, noise, resting = (np.zeros((size, size)) for size in (STATES, STATES, STATES - 1))
+        drift[0] = SLOPE
+        body, wide = slice(BODY, WIDE), slice(WIDE, STATES)
+        moving, density, rest = _body(self.corner_per_m * step_m, self.cutoff_per_m * step_m)
+        drift[body, body], noise[WIDE - 1, WIDE - 1], resting[: WIDE - 1, : WIDE - 1] = moving, density, rest
+        width = self.width_per_m * step_m
+        drift[wide, wide] = [[0.0, 1.0], [-(width**2), -2 * width]]
+        noise[-1, -1] = 4 * width**3 * self.wide_share**2
+        resting[WIDE - 1 :, WIDE - 1 :] = self.wide_share**2 * np.diag([1.0, width**2])
+        return drift, step_m**2 * noise, step_m**2 * resting
+
+
+def _body(corner: float, cutoff: float) -> tuple[FloatArray, float, FloatArray]:
+    """F, density of the noise and covariance at rest of (u, u′, …, u⁗), in steps, for var u = 1."""
+    # in units in which the poles lie about one, so that nothing is lost between u and u⁗
+    unit = (corner**CORNER_POLES * cutoff**CUTOFF_POLES) ** (1 / ORDER)
+    moving = np.diag(np.ones(ORDER - 1), 1)
+    moving[-1] = _friction(corner / unit, cutoff / unit)
+    last = np.zeros((ORDER, ORDER))
+    last[-1, -1] = 1.0
+    resting = at_rest(moving, last)
+    scale = unit ** np.arange(ORDER)
+    power = 1 / resting[0, 0]
+    return (
+        unit * moving * np.outer(scale, 1 / scale),
+        float(power * unit * scale[-1] ** 2),
+        power * resting * np.outer(scale, scale),
+    )
 
 
 def start(at_rest: FloatArray, sigma: float, *, place_sigma_m: float) -> FloatArray:
-    """Return the covariance, shape (6, 6), of a state of which only the prior is known, at a place that is not."""
+    """Return the covariance, shape (8, 8), of a state of which only the prior is known, at a place that is not."""
     covariance = np.zeros((STATES, STATES))
     covariance[0, 0] = place_sigma_m**2
     covariance[1:, 1:] = sigma**2 * at_rest
@@ -132,12 +154,11 @@ def _product(a, b, out):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _series(f, a, q):  # type: ignore[no-untyped-def]
+def _series(f, noise, a, q):  # type: ignore[no-untyped-def]
     """Write A and Q over a step that is short enough for the series to converge at once."""
     size = f.shape[0]
-    power, change, one = np.eye(size), np.zeros((size, size)), np.empty((size, size))
+    power, change, one = np.eye(size), noise.copy(), np.empty((size, size))
     a[:] = power
-    change[-1, -1] = 1.0
     q[:] = change
     for n in range(1, TERMS):
         _product(f, power, one)
@@ -158,25 +179,24 @@ def _double(a, q, one, two):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def one_step(f):  # type: ignore[no-untyped-def]
-    """Return exp(F) and ∫₀¹ exp(Ft) L Lᵀ exp(Ft)ᵀ dt, L being the last unit vector."""
+def one_step(f, noise):  # type: ignore[no-untyped-def]
+    """Return exp(F) and ∫₀¹ exp(Ft) W exp(Ft)ᵀ dt, W being the density of the noise."""
     largest = 0.0
     for i in range(f.shape[0]):
         largest = max(largest, np.sum(np.abs(f[i])))
     halvings = max(0, int(np.ceil(np.log2(largest))))
     share = 0.5**halvings
     a, q, one, two = np.empty_like(f), np.empty_like(f), np.empty_like(f), np.empty_like(f)
-    _series(f * share, a, q)
-    q *= share
+    _series(f * share, noise * share, a, q)
     for _ in range(halvings):
         _double(a, q, one, two)
     return a, q
 
 
 @numba.njit(cache=True, nogil=True)
-def at_rest(f):  # type: ignore[no-untyped-def]
-    """Return ∫₀^∞ exp(Ft) L Lᵀ exp(Ft)ᵀ dt of a stable F: the solution of F P + P Fᵀ + L Lᵀ = 0."""
-    a, q = one_step(f)
+def at_rest(f, noise):  # type: ignore[no-untyped-def]
+    """Return ∫₀^∞ exp(Ft) W exp(Ft)ᵀ dt of a stable F: the solution of F P + P Fᵀ + W = 0."""
+    a, q = one_step(f, noise)
     one, two = np.empty_like(f), np.empty_like(f)
     while np.max(np.abs(a)) > NOTHING:
         _double(a, q, one, two)
@@ -193,6 +213,8 @@ def taylor(fraction: FloatArray) -> FloatArray:
 
     Returns
     -------
-    float64 array, shape (reading, 6)
+    float64 array, shape (reading, 8)
+        Of v only its first two derivatives count.
     """
-    return np.stack([fraction**i / factorial(i) for i in range(STATES)], axis=-1)
+    powers = [fraction**i / factorial(i) for i in range(WIDE + 1)]
+    return np.stack([*powers[:WIDE], powers[1], powers[2]], axis=-1)

@@ -22,8 +22,14 @@ from gramoscope.tonearm.linear_gaussian import Gate, Moves, Readings, blank, for
 
 GATE = 4.0
 """Samples further than this many standard errors from their prediction count as if they lay right there."""
-DRIFT = np.array([0.7, 0.35, 0.35])
-"""How much λ, μ and the share are expected to change from one learning to the next, e-folds."""
+DRIFT = np.array([0.7, 0.35, 0.35, 0.5, 0.35])
+"""How much λ, μ, ν, the wide share and the share are expected to change from one learning to the next, e-folds."""
+UNHEARD = np.array([np.inf, np.inf, 0.7, 1.2, np.inf])
+"""How well they are known before anything was learned, e-folds: nothing of the body, something of what is wide."""
+WIDE_SHARES = (1e-3, 0.3)
+"""Least and largest √(var v / var u)."""
+USUAL_WIDE_SHARE = 0.01
+"""− 40 dB: what speech, song, piano and orchestra have above 5 kHz. Where it drowns, only this is known of it."""
 SHARES = (0.3, 10.0)
 """Least and largest bend, for each unit of the level."""
 SLOPE_SIGMA = 0.05
@@ -40,23 +46,24 @@ class PriorLimits:
     ----------
     floor : float
         What a groove bends at the least.
-    corner_per_m, cutoff_per_m : (float, float)
+    corner_per_m, cutoff_per_m, width_per_m : (float, float)
         Least and largest.
     """
 
     floor: float
     corner_per_m: tuple[float, float]
     cutoff_per_m: tuple[float, float]
+    width_per_m: tuple[float, float]
 
     @property
     def logarithms(self) -> FloatArray:
-        """Of least and largest, shape (3, 2)."""
-        return np.log([self.corner_per_m, self.cutoff_per_m, SHARES])
+        """Of least and largest, shape (5, 2)."""
+        return np.log([self.corner_per_m, self.cutoff_per_m, self.width_per_m, WIDE_SHARES, SHARES])
 
     @property
     def middle(self) -> GroovePrior:
         """What is believed when nothing can be learned."""
-        return _prior(np.array([*self.logarithms[:2].mean(axis=1), 0.0]), self)
+        return _prior(np.array([*self.logarithms[:3].mean(axis=1), np.log(USUAL_WIDE_SHARE), 0.0]), self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,11 +111,11 @@ def learn(
     known, first, step = (
         _logarithms(before or limits.middle),
         _logarithms(limits.middle),
-        np.array([1.0, -0.7, 0.4]),
+        np.array([1.0, -0.7, 0.4, 1.0, 0.4]),
     )
 
     def cost(logarithms: FloatArray) -> float:
-        change = (logarithms - known) / DRIFT if before else np.zeros(3)
+        change = (logarithms - known) / (DRIFT if before else UNHEARD)
         prior = _prior(logarithms, limits)
         disbelief = 0.5 * float(change @ change) + 0.5 * _louder(lessons, step_m, prior) ** 2
         return disbelief - _log_likelihood(lessons, step_m, prior)
@@ -116,7 +123,7 @@ def learn(
     # what was learned in silence can be so far off that nothing leads away from it
     if before and cost(known) <= cost(first):
         first, step = known, 0.4 * step
-    return _prior(_least(cost, first, step, limits.logarithms, 60 if before else 120), limits)
+    return _prior(_least(cost, first, step, limits.logarithms, 100 if before else 250), limits)
 
 
 def _louder(lessons: Sequence[Lesson], step_m: float, prior: GroovePrior) -> float:
@@ -139,7 +146,7 @@ def _least(
     inside = np.clip(first, *bounds.T)
     there = inside + step
     step = np.where((there < bounds[:, 0]) | (there > bounds[:, 1]), -step, step)
-    simplex = inside + np.vstack([np.zeros(3), np.diag(step)])
+    simplex = inside + np.vstack([np.zeros(step.size), np.diag(step)])
     options: Any = {"xatol": 0.1, "fatol": 0.3, "maxfev": looks, "initial_simplex": np.clip(simplex, *bounds.T)}
     found = optimize.minimize(cost, inside, method="Nelder-Mead", bounds=optimize.Bounds(*bounds.T), options=options)
     return np.asarray(found.x)
@@ -159,9 +166,9 @@ def _log_likelihood(lessons: Sequence[Lesson], step_m: float, prior: GroovePrior
 
 
 def _logarithms(prior: GroovePrior) -> FloatArray:
-    return np.log([prior.corner_per_m, prior.cutoff_per_m, prior.share])
+    return np.log([prior.corner_per_m, prior.cutoff_per_m, prior.width_per_m, prior.wide_share, prior.share])
 
 
 def _prior(logarithms: FloatArray, limits: PriorLimits) -> GroovePrior:
-    corner, cutoff, share = np.exp(np.clip(logarithms, *limits.logarithms.T))
-    return GroovePrior(float(corner), float(cutoff), float(share), limits.floor)
+    corner, cutoff, width, wide_share, share = np.exp(np.clip(logarithms, *limits.logarithms.T)).tolist()
+    return GroovePrior(corner, cutoff, width, wide_share, share, limits.floor)

@@ -48,8 +48,8 @@ class PlaceSmoother:
         How far behind the newest sample it answers, in units of 1/λ, the length along which the prior forgets.
     gate : float
         A sample further than this many standard errors from what the others say is an outlier and gets no weight.
-    corner_limits_hz, cutoff_limits_hz : (float, float)
-        Least and largest corner λV/2π and cut-off μV/2π that the music may have.
+    corner_limits_hz, cutoff_limits_hz, width_limits_hz : (float, float)
+        Least and largest corner λV/2π, cut-off μV/2π and width νV/2π that the music may have.
     floor_m_s : float
         Least change of velocity over `BEND_M` (standard deviation) that the prior expects of the direction that is
         listened to.
@@ -63,6 +63,7 @@ class PlaceSmoother:
     gate: float = 5.0
     corner_limits_hz: tuple[float, float] = (300.0, 20_000.0)
     cutoff_limits_hz: tuple[float, float] = (2_000.0, 60_000.0)
+    width_limits_hz: tuple[float, float] = (5_000.0, 12_000.0)
     floor_m_s: float = 3e-4
     other_floor_m_s: float = 2e-4
 
@@ -72,7 +73,7 @@ class PlaceSmoother:
         require(self.gate > 1, f"a gate of {self.gate} standard errors", "above 1")
         for floor in (self.floor_m_s, self.other_floor_m_s):
             require(0 < floor < 0.5, f"a floor of {floor} m/s", "above 0, below 0.5")
-        for low, high in (self.corner_limits_hz, self.cutoff_limits_hz):
+        for low, high in (self.corner_limits_hz, self.cutoff_limits_hz, self.width_limits_hz):
             require(0 < low < high, f"limits of {low} … {high} Hz", "two rising frequencies")
 
     def follow(self, traces: Iterable[WallTrace], course: Course) -> Iterator[GrooveMotion]:
@@ -105,6 +106,7 @@ class PlaceSmoother:
             groups=self.learn_groups,
             corner_limits_hz=self.corner_limits_hz,
             cutoff_limits_hz=self.cutoff_limits_hz,
+            width_limits_hz=self.width_limits_hz,
             floor_m_s=self.floor_m_s,
             other_floor_m_s=self.other_floor_m_s,
         )

@@ -43,6 +43,7 @@ class Teaching:
     groups: int
     corner_limits_hz: tuple[float, float]
     cutoff_limits_hz: tuple[float, float]
+    width_limits_hz: tuple[float, float]
     floor_m_s: float
     other_floor_m_s: float
 
@@ -148,9 +149,11 @@ class Teacher:
         speed = float(self.course.rotation.speed_at_m_s(arc_m))
         mine = direction == self.course.direction
         floor = self.teaching.floor_m_s if mine else self.teaching.other_floor_m_s
-        (low, high), (lowest, highest) = self.teaching.corner_limits_hz, self.teaching.cutoff_limits_hz
-        per_hz = 2 * np.pi / speed
-        return PriorLimits(floor / speed, (per_hz * low, per_hz * high), (per_hz * lowest, per_hz * highest))
+        corner, cutoff, width = (
+            (2 * np.pi * low / speed, 2 * np.pi * high / speed)
+            for low, high in (self.teaching.corner_limits_hz, self.teaching.cutoff_limits_hz, self.teaching.width_limits_hz)
+        )
+        return PriorLimits(floor / speed, corner, cutoff, width)
 
 
 def _put_right(stretch: Stretch, error: float) -> Stretch:
