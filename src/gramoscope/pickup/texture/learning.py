@@ -32,9 +32,8 @@ from gramoscope.pickup.texture.likelihood import (
     best_shares,
     quiet_power,
     softened,
-    witnesses,
 )
-from gramoscope.pickup.texture.reading import Model, Rules, Stretch, clear_columns, evidence, step, windows
+from gramoscope.pickup.texture.reading import Model, Rules, Stretch, clear_columns, evidence, step, testimony, windows
 from gramoscope.pickup.texture.spectrum import Band, CrossSpectra, cross_spectra, precision, whitening_filter
 from gramoscope.pickup.texture.tone import Tone, mean_level
 
@@ -75,6 +74,8 @@ class Learning:
         Tones to choose from, see `texture.tone`; rounds before the choice use the first.
     least_columns : int
         A stripe seen in fewer columns is not read.
+    spread_noises, spread_limit_px : float
+        Witnesses are heard so many standard errors of a path on either side of it, and so many pixels at the most.
     folds : int
         Parts of the learning groups, each read by what the others taught; 2 or more.
     """
@@ -87,10 +88,14 @@ class Learning:
     loading: tuple[float, ...] = (0.03, 0.03, 0.01, 0.003, 0.001, 0.001, 0.001)
     compressions: tuple[float, ...] = (0.0, 0.9)
     least_columns: int = 6000
+    spread_noises: float = 4.0
+    spread_limit_px: float = 0.8
     folds: int = 4
 
     def __post_init__(self) -> None:
         require(self.half_px >= 4, f"windows of ± {self.half_px} rows", "4 or more")
+        require(self.spread_noises >= 0, f"a spread of {self.spread_noises} standard errors", "0 or more")
+        require(0 <= self.spread_limit_px <= 2, f"a spread of up to {self.spread_limit_px} px", "0 … 2")
         require(self.folds >= 2, f"{self.folds} folds", "2 or more")
         require(len(self.loading) >= 1, "no rounds", "at least one loading")
         require(len(self.compressions) >= 1, "no tone", "at least one compression; 0 leaves pictures as they are")
@@ -134,6 +139,8 @@ class Learning:
             if number == choice:
                 blanks += [self._whitening(blank, stretches, rules, spread) for blank in toned[1:]]
             before = lessons[-1].whole if lessons else None
+            spread_px = self.spread_px(before, rules)
+            blanks = [replace(blank, spread_px=spread_px) for blank in blanks]
             tried = [self._lesson(stretches, fold, blank, before, loading, rules, spread) for blank in blanks]
             lesson = max(tried, key=lambda one: one.whole.precision)
             blanks = [replace(lesson.whole, stripes=())]
@@ -141,6 +148,12 @@ class Learning:
             lessons.append(lesson)
             told()
         return tuple(lessons)
+
+    def spread_px(self, before: Model | None, rules: Rules) -> float:
+        """Return how far on either side of a path its witnesses are heard, by what was known before."""
+        if before is None:
+            return self.spread_limit_px
+        return min(self.spread_noises * before.path_noise_px(rules.smooth_px), self.spread_limit_px)
 
     def _improved(
         self, stretches: list[Stretch], fold: IntArray, lesson: Lesson, cut: Cut, rules: Rules, spread: Spread
@@ -310,10 +323,11 @@ class Learning:
             laid = self._laid(stretch, blank, number, statistics, rules)
             if laid is None:
                 return None
-            window, derivative, weight = laid
-            u = witnesses(window, derivative, weight, statistics, band=blank.band, length=blank.length)
+            _, _, weight = laid
+            row = blank.layout.rows(stretch.displacement_px)[number]
+            u = testimony(stretch, row, weight, blank, statistics)
             answers = [
-                self._moved(stretch, blank, number, statistics, weight, side * MOVE_PX) @ weight for side in (-1, 1)
+                testimony(stretch, row + side * MOVE_PX, weight, blank, statistics) @ weight for side in (-1, 1)
             ]
             return u, weight.astype(np.float64), (answers[0] - answers[1]) / (2 * MOVE_PX)
 
@@ -324,19 +338,6 @@ class Learning:
         powers = np.sum([power for power, _ in quiet], axis=0) / max(sum(size for _, size in quiet), 1e-12)
         answers = np.sum([answer for _, _, answer in told], axis=0) / columns
         return mean, answers, powers
-
-    def _moved(
-        self,
-        stretch: Stretch,
-        model: Model,
-        number: int,
-        statistics: StripeStatistics,
-        weight: Float32Array,
-        move_px: float,
-    ) -> FloatArray:
-        row = model.layout.rows(stretch.displacement_px)[number] + move_px
-        window, derivative = windows(stretch, row, model)
-        return witnesses(window, derivative, weight, statistics, band=model.band, length=model.length)
 
 
 MOVE_PX = 0.1

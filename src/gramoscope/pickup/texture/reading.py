@@ -72,6 +72,8 @@ class Model:
         Of the transforms.
     stripes : tuple of StripeStatistics or None
         None for a stripe of which too little was seen.
+    spread_px : float
+        How far on either side of a path its witnesses are heard.
     """
 
     layout: StripeLayout
@@ -81,6 +83,12 @@ class Model:
     band: Band
     length: int
     stripes: tuple[StripeStatistics | None, ...]
+    spread_px: float = 0.0
+
+    def path_noise_px(self, smooth_px: float) -> float:
+        """Return the standard error that a path would have if errors were as claimed, smoothed by a Gaussian."""
+        information = sum(one.trust * one.information for one in self.stripes if one is not None)
+        return float(1 / np.sqrt(2 * np.sqrt(np.pi) * smooth_px * max(information, 1e-3)))
 
     @property
     def precision(self) -> float:
@@ -166,10 +174,9 @@ def evidence(stretch: Stretch, model: Model, rules: Rules) -> Evidence:
         clear = clear_columns(stretch, number, row, visible[number], model.half_px, rules)
         if not clear.any():
             continue
-        window, derivative = windows(stretch, row, model)
-        clear &= believable(window, statistics.row_power, limits=rules.power_limits)
+        clear &= believable(windows(stretch, row, model)[0], statistics.row_power, limits=rules.power_limits)
         weight = softened(clear)
-        u = statistics.share @ witnesses(window, derivative, weight, statistics, band=model.band, length=model.length)
+        u = statistics.share @ testimony(stretch, row, weight, model, statistics)
         weight64 = weight.astype(np.float64)
         u = (u - statistics.mean_score) * statistics.trust
         score[wall] += weight64 * u
@@ -178,6 +185,18 @@ def evidence(stretch: Stretch, model: Model, rules: Rules) -> Evidence:
         surprise[wall] += power[0, 0], columns * statistics.trust**2 * statistics.score_power
     with np.errstate(invalid="ignore", divide="ignore"):
         return Evidence(score, information, surprise[:, 0] / surprise[:, 1])
+
+
+def testimony(
+    stretch: Stretch, stripe_row: FloatArray, weight: Float32Array, model: Model, statistics: StripeStatistics
+) -> FloatArray:
+    """Return what both witnesses say of a path, the mean of what they say on either side of it, shape (2, column)."""
+    sides = (-model.spread_px, model.spread_px) if model.spread_px else (0.0,)
+    heard = [
+        witnesses(*windows(stretch, stripe_row + side, model), weight, statistics, band=model.band, length=model.length)
+        for side in sides
+    ]
+    return np.asarray(np.mean(heard, axis=0))
 
 
 def step(found: Evidence, cut: Cut, rules: Rules) -> FloatArray:

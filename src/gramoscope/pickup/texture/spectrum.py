@@ -70,12 +70,12 @@ def whitening_filter(power: FloatArray, band: Band) -> FloatArray:
 
 
 def filtered(rows: Float32Array, taps: FloatArray) -> Float32Array:
-    """Return rows filtered along the columns by a symmetric filter; zeros are assumed beyond the ends."""
-    width = rows.shape[-1]
-    length = fft.next_fast_len(width + taps.size - 1, real=True)
-    half = taps.size // 2
-    out = fft.irfft(fft.rfft(rows, length) * fft.rfft(taps.astype(np.float32), length), length)
-    return np.ascontiguousarray(out[..., half : half + width], np.float32)
+    """Return rows filtered along the columns by a symmetric filter; beyond the ends they are mirrored."""
+    width, half = rows.shape[-1], taps.size // 2
+    length = fft.next_fast_len(width + 2 * taps.size, real=True)
+    beyond = np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(half, half)], mode="symmetric")
+    out = fft.irfft(fft.rfft(beyond, length) * fft.rfft(taps.astype(np.float32), length), length)
+    return np.ascontiguousarray(out[..., 2 * half : 2 * half + width], np.float32)
 
 
 @dataclass(eq=False)
