@@ -23,6 +23,7 @@ from gramoscope.pickup.texture.reading import (
     read,
     settled,
     step,
+    witnessed,
 )
 from gramoscope.pickup.texture.spectrum import Band
 from gramoscope.pickup.texture.tone import Tone
@@ -195,3 +196,43 @@ def test_a_damaged_place_says_nothing_and_spoils_nothing(
     # the bridge is as wrong as the start was, no worse
     assert np.abs(path.displacement_px - true_px(77)).max() < np.abs(another.displacement_px - true_px(77)).max() + 0.7
     assert np.isfinite(evidence(path, models[-1], RULES).score).all()
+
+
+def _noisy(one: Stretch, seed: int) -> Stretch:
+    noise = 3.0 * np.random.default_rng([seed, 9]).normal(size=one.columns.shape)
+    return replace(one, columns=(one.columns + noise).astype(np.float32))
+
+
+def test_where_texture_tells_little_paths_are_better_when_both_sides_are_heard(
+    stretches: list[Stretch], another: Stretch, layout: StripeLayout, true_px: Callable[[int], FloatArray]
+) -> None:
+    noisy, unread = [_noisy(one, i) for i, one in enumerate(stretches)], [_noisy(another, seed) for seed in range(70, 76)]
+    errors, spreads = [], []
+    for noises in (0.0, 4.0):
+        learning = Learning(
+            half_px=9,
+            largest_lag_px=60,
+            loading=(0.03, 0.01, 0.003, 0.001, 0.001),
+            least_columns=3000,
+            folds=3,
+            spread_noises=noises,
+            spread_limit_px=min(noises, 0.8),
+        )
+        models = [lesson.whole for lesson in learning.learn(noisy, layout, "lateral", RULES, map)]
+        paths = [read(one, models, "lateral", RULES)[0].displacement_px for one in unread]
+        errors.append(np.std([(path - true_px(77)).mean(axis=0)[60:-60] for path in paths]))
+        spreads.append([model.spread_px for model in models])
+    # a path settles where the score is zero, and there its noise looks like an answer
+    assert errors[1] < 0.95 * errors[0]
+    assert spreads[0] == [0.0] * 5
+    assert spreads[1][0] == 0.8
+    known = models[-2].path_noise_px(RULES.smooth_px)
+    assert spreads[1][-1] == pytest.approx(min(4.0 * known, 0.8))
+    row, weight = layout.rows(another.displacement_px)[0], np.ones(WIDTH + 100, np.float32)
+    statistics = models[-1].stripes[0]
+    assert statistics is not None
+    both, low, high = (
+        witnessed(another, row + side, weight, replace(models[-1], spread_px=spread), statistics)
+        for side, spread in ((0.0, 0.5), (-0.5, 0.0), (0.5, 0.0))
+    )
+    np.testing.assert_allclose(both, (low + high) / 2, rtol=1e-6, atol=1e-9)

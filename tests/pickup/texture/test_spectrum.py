@@ -145,11 +145,12 @@ def test_a_whitened_spectrum_is_flat_in_the_band_and_nothing_outside(law: str) -
     assert (white_db[frequency > 0.45] < white_db[inside].mean() - 15).all()
 
 
-def test_filtering_moves_nothing_and_takes_the_outside_for_zero() -> None:
+def test_filtering_moves_nothing_and_mirrors_what_lies_outside() -> None:
     rng = np.random.default_rng(3)
     rows, half = rng.normal(size=(4, 333)).astype(np.float32), rng.normal(size=21)
     taps = np.concatenate([half[:0:-1], half])
-    direct = np.array([np.convolve(row, taps, mode="same") for row in rows])
+    mirrored = np.concatenate([rows[:, 19::-1], rows, rows[:, :-21:-1]], axis=1)
+    direct = np.array([np.convolve(row, taps, mode="valid") for row in mirrored])
     np.testing.assert_allclose(filtered(rows, taps), direct, atol=3e-5)
 
 

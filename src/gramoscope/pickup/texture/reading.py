@@ -176,7 +176,7 @@ def evidence(stretch: Stretch, model: Model, rules: Rules) -> Evidence:
             continue
         clear &= believable(windows(stretch, row, model)[0], statistics.row_power, limits=rules.power_limits)
         weight = softened(clear)
-        u = statistics.share @ testimony(stretch, row, weight, model, statistics)
+        u = statistics.share @ witnessed(stretch, row, weight, model, statistics)
         weight64 = weight.astype(np.float64)
         u = (u - statistics.mean_score) * statistics.trust
         score[wall] += weight64 * u
@@ -187,7 +187,7 @@ def evidence(stretch: Stretch, model: Model, rules: Rules) -> Evidence:
         return Evidence(score, information, surprise[:, 0] / surprise[:, 1])
 
 
-def testimony(
+def witnessed(
     stretch: Stretch, stripe_row: FloatArray, weight: Float32Array, model: Model, statistics: StripeStatistics
 ) -> FloatArray:
     """Return what both witnesses say of a path, the mean of what they say on either side of it, shape (2, column)."""
