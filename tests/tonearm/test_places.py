@@ -17,8 +17,13 @@ LATERAL, VERTICAL = 0, 1
 GROUPS = 40
 
 
-def _speech(f: np.ndarray) -> np.ndarray:
+def _dull(f: np.ndarray) -> np.ndarray:
     return 1 / (1 + (f / 700) ** 2) ** 0.75 / (1 + (f / 6000) ** 8)
+
+
+def _speech(f: np.ndarray) -> np.ndarray:
+    """With its breath and consonants, 36 dB below the rest and most of them below the readings' noise."""
+    return np.hypot(_dull(f), 4e-3 / (1 + (f / 11_000) ** 4))
 
 
 SPECTRA: dict[str, Callable[[np.ndarray], np.ndarray]] = {
@@ -28,13 +33,16 @@ SPECTRA: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "matern 5/2": lambda f: 1 / (1 + (f / 5000) ** 2) ** 1.5,
     "ornstein-uhlenbeck": lambda f: (f < 40e3) / np.sqrt(1 + (f / 2000) ** 2),
     "speech": _speech,
+    "dull speech": _dull,
 }
+WIDE_COST = {"dull speech": 1.32}
+"""What it costs to expect breath where there is none."""
 
 
 def _both(bench: Any, *, groups: int = GROUPS, vertical: float = 0.004, seed: int = 8) -> tuple[Any, Any]:
     return (
         bench.course(SPECTRA["band-limited"], 0.03, groups=groups, seed=seed),
-        bench.course(_speech, vertical, groups=groups, seed=seed + 50),
+        bench.course(_dull, vertical, groups=groups, seed=seed + 50),
     )
 
 
@@ -53,7 +61,7 @@ def test_the_claimed_error_is_the_real_one(bench: Any, name: str) -> None:
         errors.append([heard.error(i, heard.measured) ** 2 for i in (LATERAL, VERTICAL)])
     ratio = np.sqrt(np.mean(claims, axis=0) / np.mean(errors, axis=0))
     # 1.18 is what the prior costs where a spectrum ends like a wall (see `groove_prior`); overlaps add 0.03
-    assert 0.8 < ratio[LATERAL] < 1.27
+    assert 0.8 < ratio[LATERAL] < WIDE_COST.get(name, 1.27)
     assert 0.8 < ratio[VERTICAL] < 1.27
 
 
@@ -126,20 +134,25 @@ def test_a_direction_that_nothing_was_seen_of_is_unknown(bench: Any, lose: Calla
 
 @pytest.mark.parametrize("amplitude_m", [10e-6, 100e-6])
 def test_a_third_of_the_samples_may_be_wild(bench: Any, amplitude_m: float) -> None:
-    lateral, vertical = _both(bench)
-    traces, rng = bench.traces(lateral, vertical, groups=GROUPS), np.random.default_rng(4)
-    spoilt = []
-    for trace in traces:
-        wild = (rng.random(trace.offset_m.shape) < 0.3) * rng.uniform(-amplitude_m, amplitude_m, trace.offset_m.shape)
-        spoilt.append(replace(trace, offset_m=trace.offset_m + wild))
-    clean, heard = (bench.hear(one, lateral, vertical) for one in (traces, spoilt))
-    assert heard.error(LATERAL, heard.measured) < 4 * clean.error(LATERAL, clean.measured)
-    for direction in (LATERAL, VERTICAL):
-        off = np.abs(heard.velocity - heard.true)[direction] / heard.sigma[direction]
-        # where half of a neighbourhood happens to agree on something else, nobody could tell
-        assert np.mean(off[heard.measured] > 5) < 0.01
-        good = heard.measured & (off < 5)
-        assert 0.8 < heard.ratio(direction, good) < 1.3
+    worse, wrong, ratios = [], [], []
+    for seed in range(5):
+        lateral, vertical = _both(bench, seed=seed)
+        traces, rng = bench.traces(lateral, vertical, groups=GROUPS), np.random.default_rng(seed)
+        spoilt = []
+        for trace in traces:
+            wild = (rng.random(trace.offset_m.shape) < 0.3) * rng.uniform(
+                -amplitude_m, amplitude_m, trace.offset_m.shape
+            )
+            spoilt.append(replace(trace, offset_m=trace.offset_m + wild))
+        clean, heard = (bench.hear(one, lateral, vertical) for one in (traces, spoilt))
+        worse.append(heard.error(LATERAL, heard.measured) / clean.error(LATERAL, clean.measured))
+        off = np.abs(heard.velocity - heard.true) / heard.sigma
+        wrong.append(np.mean(off[:, heard.measured] > 5, axis=1))
+        ratios.append([heard.ratio(i, heard.measured & (off[i] < 5)) for i in (LATERAL, VERTICAL)])
+    # where half of a neighbourhood happens to agree on something else, nobody could tell
+    assert np.median(worse) < 4
+    assert np.max(np.mean(wrong, axis=0)) < 0.01
+    assert np.all(np.abs(np.mean(ratios, axis=0) - 1.05) < 0.25)
     # both walls wild in three neighbouring samples
     assert ((heard.flags & Quality.OUTLIER) != 0).any()
 

@@ -45,7 +45,7 @@ NORMAL_MEDIAN = 0.455
 """Median of the square of a normal number."""
 ROUNDS = 4
 """At most so often is looked again which readings are outliers."""
-SLOPES = np.kron(np.eye(2), SLOPE)
+SLOPES: FloatArray = np.kron(np.eye(2), SLOPE).astype(np.float64)
 """The lateral and the vertical slope (times the step) are these rows times the state."""
 
 

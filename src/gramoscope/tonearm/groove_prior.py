@@ -79,7 +79,8 @@ class GroovePrior:
     def steps(self, step_m: float) -> tuple[FloatArray, FloatArray]:
         """Return A and Q for one step of the grid, shape (8, 8) each, the state in metres and var u = 1."""
         drift, noise, _ = self._process(step_m)
-        return one_step(drift, noise)
+        a, q = one_step(drift, noise)
+        return a, q
 
     def at_rest(self, step_m: float) -> FloatArray:
         """Return the covariance of all but the place before anything was seen, shape (7, 7), for var u = 1."""

@@ -151,7 +151,11 @@ class Teacher:
         floor = self.teaching.floor_m_s if mine else self.teaching.other_floor_m_s
         corner, cutoff, width = (
             (2 * np.pi * low / speed, 2 * np.pi * high / speed)
-            for low, high in (self.teaching.corner_limits_hz, self.teaching.cutoff_limits_hz, self.teaching.width_limits_hz)
+            for low, high in (
+                self.teaching.corner_limits_hz,
+                self.teaching.cutoff_limits_hz,
+                self.teaching.width_limits_hz,
+            )
         )
         return PriorLimits(floor / speed, corner, cutoff, width)
 

@@ -206,7 +206,10 @@ def _noisy(one: Stretch, seed: int) -> Stretch:
 def test_where_texture_tells_little_paths_are_better_when_both_sides_are_heard(
     stretches: list[Stretch], another: Stretch, layout: StripeLayout, true_px: Callable[[int], FloatArray]
 ) -> None:
-    noisy, unread = [_noisy(one, i) for i, one in enumerate(stretches)], [_noisy(another, seed) for seed in range(70, 76)]
+    noisy, unread = (
+        [_noisy(one, i) for i, one in enumerate(stretches)],
+        [_noisy(another, seed) for seed in range(70, 76)],
+    )
     errors, spreads = [], []
     for noises in (0.0, 4.0):
         learning = Learning(

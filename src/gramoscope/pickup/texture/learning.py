@@ -33,7 +33,7 @@ from gramoscope.pickup.texture.likelihood import (
     quiet_power,
     softened,
 )
-from gramoscope.pickup.texture.reading import Model, Rules, Stretch, clear_columns, evidence, step, witnessed, windows
+from gramoscope.pickup.texture.reading import Model, Rules, Stretch, clear_columns, evidence, step, windows, witnessed
 from gramoscope.pickup.texture.spectrum import Band, CrossSpectra, cross_spectra, precision, whitening_filter
 from gramoscope.pickup.texture.tone import Tone, mean_level
 
@@ -326,9 +326,7 @@ class Learning:
             _, _, weight = laid
             row = blank.layout.rows(stretch.displacement_px)[number]
             u = witnessed(stretch, row, weight, blank, statistics)
-            answers = [
-                witnessed(stretch, row + side * MOVE_PX, weight, blank, statistics) @ weight for side in (-1, 1)
-            ]
+            answers = [witnessed(stretch, row + side * MOVE_PX, weight, blank, statistics) @ weight for side in (-1, 1)]
             return u, weight.astype(np.float64), (answers[0] - answers[1]) / (2 * MOVE_PX)
 
         told = [one for one in spread(tried, zip(stretches, fold, strict=True)) if one is not None]
