@@ -84,19 +84,18 @@ def quintic_taps(fraction: float) -> tuple[float, float, float, float, float, fl
 
 
 @numba.njit(cache=True, nogil=True)
-def _add_row(row, start, stop, offset, taps, weight, total, moment):  # type: ignore[no-untyped-def]
+def _add_row(before, here, after, beyond, taps, weight, total, moment):  # type: ignore[no-untyped-def]
     w0, w1, w2, w3 = taps
     w0, w1, w2, w3 = np.float32(w0), np.float32(w1), np.float32(w2), np.float32(w3)
     k = np.float32(weight)
-    for x in range(start, stop):
-        i = x + offset
-        value = w0 * row[i - 1] + w1 * row[i] + w2 * row[i + 1] + w3 * row[i + 2]
+    for x in range(total.size):
+        value = w0 * before[x] + w1 * here[x] + w2 * after[x] + w3 * beyond[x]
         total[x] += value
         moment[x] += k * value
 
 
 @numba.njit(cache=True, nogil=True)
-def _placement(shift_px: float, width: int, canvas_width: int) -> tuple[int, int, int, float]:
+def placement(shift_px: float, width: int, canvas_width: int) -> tuple[int, int, int, float]:
     """Canvas columns [start, stop) that a frame covers, its column minus theirs, and the fraction between."""
     offset = int(np.floor(-shift_px))
     fraction = -shift_px - offset
@@ -115,8 +114,12 @@ def _register(images, shift_px, weights, counts, mean_weight, spread, mean, tren
         total[:] = np.float32(0)
         moment[:] = np.float32(0)
         for k in range(frames):
-            start, stop, offset, fraction = _placement(shift_px[k], width, canvas_width)
-            _add_row(images[k, row], start, stop, offset, cubic_taps(fraction), weights[k], total, moment)
+            start, stop, offset, fraction = placement(shift_px[k], width, canvas_width)
+            seen = images[k, row, start + offset - 1 : stop + offset + 2]
+            here = slice(start, stop)
+            _add_row(
+                seen[:-3], seen[1:-2], seen[2:-1], seen[3:], cubic_taps(fraction), weights[k], total[here], moment[here]
+            )
         for x in range(canvas_width):
             if counts[x] > 0:
                 mean[row, x] = total[x] / counts[x]
@@ -143,7 +146,7 @@ def register(images: ImageArray, shift_px: FloatArray, frame_index: npt.NDArray[
     canvas_width = width + int(np.floor(shift_px.max(initial=0.0)))
     counts, first, second = (np.zeros(canvas_width) for _ in range(3))
     for shift, k in zip(shift_px, frame_index, strict=True):
-        start, stop, _, _ = _placement(float(shift), width, canvas_width)
+        start, stop, _, _ = placement(float(shift), width, canvas_width)
         counts[start:stop] += 1
         first[start:stop] += k
         second[start:stop] += k * k
@@ -186,34 +189,51 @@ def _texture_of_rows(image):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _row_normal_equation(here, there, offset, taps, start, stop):  # type: ignore[no-untyped-def]
+def _widen(row, wide):  # type: ignore[no-untyped-def]
+    for x in range(row.size):
+        wide[x] = row[x]
+
+
+@numba.njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
+def _row_normal_equation(far_before, before, here, after, far_after, taps, t0, t1, t2, t3, t4, t5):  # type: ignore[no-untyped-def]
     w0, w1, w2, w3, w4, w5 = taps
-    square = 0.0
-    cross = 0.0
-    for x in range(start, stop):
-        i = x + offset
-        moved = w0 * there[i - 2] + w1 * there[i - 1] + w2 * there[i] + w3 * there[i + 1]
-        moved += w4 * there[i + 2] + w5 * there[i + 3]
-        gradient = 0.25 * (float(here[x + 2]) + float(here[x + 1]) - float(here[x - 1]) - float(here[x - 2])) / 1.5
+    w0, w1, w2 = np.float32(w0), np.float32(w1), np.float32(w2)
+    w3, w4, w5 = np.float32(w3), np.float32(w4), np.float32(w5)
+    square = np.float32(0)
+    cross = np.float32(0)
+    for x in range(here.size):
+        moved = w0 * t0[x] + w1 * t1[x] + w2 * t2[x] + w3 * t3[x] + w4 * t4[x] + w5 * t5[x]
+        gradient = far_after[x] + after[x] - before[x] - far_before[x]
         square += gradient * gradient
-        cross += gradient * (moved - float(here[x]))
+        cross += gradient * (moved - here[x])
     return square, cross
 
 
 @numba.njit(cache=True, nogil=True)
 def _shift_correction(here, there, rows, shift_px):  # type: ignore[no-untyped-def]
     width = here.shape[1]
-    start, stop, offset, fraction = _placement(shift_px, width, width)
-    # two more taps than `_placement` makes room for, and a gradient of five columns
+    start, stop, offset, fraction = placement(shift_px, width, width)
+    # two more taps than `placement` makes room for, and a gradient of five columns
     start, stop = max(start + 1, 2), min(stop - 1, width - 2)
+    if stop <= start:
+        return 0.0
     taps = quintic_taps(fraction)
+    wide_here, wide_there = np.empty(width, np.float32), np.empty(width, np.float32)
     square = 0.0
     cross = 0.0
+    # slices, for an index that may be negative keeps the loop from being vectorised
+    h = wide_here[start - 2 : stop + 2]
+    t = wide_there[start + offset - 2 : stop + offset + 3]
     for row in rows:
-        s, c = _row_normal_equation(here[row], there[row], offset, taps, start, stop)
+        _widen(here[row], wide_here)
+        _widen(there[row], wide_there)
+        s, c = _row_normal_equation(
+            h[:-4], h[1:-3], h[2:-2], h[3:-1], h[4:], taps, t[:-5], t[1:-4], t[2:-3], t[3:-2], t[4:-1], t[5:]
+        )
         square += s
         cross += c
-    return cross / square if square > 0 else 0.0
+    # the gradient of five columns, (x₂ + x₁ − x₋₁ − x₋₂)/6, without its sixth
+    return 6.0 * cross / square if square > 0 else 0.0
 
 
 def textured_rows(
@@ -309,9 +329,10 @@ def registered(group: FrameGroup) -> tuple[Canvas, FloatArray]:
 
 
 def overlap_textures(
-    canvas: Canvas,
     group: FrameGroup,
     *,
+    first: int,
+    width: int,
     group_step_m: float,
     texture_of: Callable[[slice], Float32Array],
     reach_px: int = 40,
@@ -320,8 +341,11 @@ def overlap_textures(
 
     Parameters
     ----------
-    canvas : Canvas
     group : FrameGroup
+    first : int
+        Number of the first frame that was used.
+    width : int
+        Columns of the canvas.
     group_step_m : float
         From stretch to stretch, nominal.
     texture_of : callable
@@ -334,9 +358,7 @@ def overlap_textures(
     head, tail : Texture or None
         None where stretches do not overlap.
     """
-    first = int(canvas.frame_index[0])
     pitch = group.pixel_pitch_m
-    width = canvas.mean.shape[1]
     overlap = width - round(group_step_m / pitch)
     if overlap <= 0:
         return None, None

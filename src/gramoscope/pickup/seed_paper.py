@@ -180,8 +180,9 @@ class SeedPaperPickup:
         kept = kept_stripes(stripes)
         planes, samples = self._orient(stripes, lines, segments)
         head, tail = overlap_textures(
-            canvas,
             group,
+            first=int(canvas.frame_index[0]),
+            width=canvas.mean.shape[1],
             group_step_m=self.bench.sequence.group_step_m,
             texture_of=lambda columns: derivatives.x[:, columns].copy(),
         )

@@ -20,7 +20,8 @@ from gramoscope.camera.exposure import Exposure
 from gramoscope.conventions import INNER, OUTER, FloatArray, IntArray
 from gramoscope.errors import require
 from gramoscope.pickup.cartridge import Line, Sketch, Spread
-from gramoscope.pickup.registration import Canvas, overlap_textures, registered
+from gramoscope.pickup.overlay import Overlay, overlaid
+from gramoscope.pickup.registration import overlap_textures
 from gramoscope.pickup.texture.calibration import aligned_layout, calibration_of
 from gramoscope.pickup.texture.groove_search import GrooveSearch
 from gramoscope.pickup.texture.layout import StripeLayout
@@ -117,8 +118,8 @@ class TextureLikelihood:
         group, _ = self.exposure.sort_out(group)
         if not group.valid.any():
             return None
-        canvas, _ = registered(group)
-        return laid_out(canvas, group.white_level)
+        laid, _ = overlaid(group)
+        return laid_out(laid, group.white_level)
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,13 +170,14 @@ class TexturePickup:
             return self._lost(group, exposure_flags, group.problems)
         if not self.taught:
             return self._lost(group, exposure_flags, (*group.problems, f"group {group.number} is not read: {UNTAUGHT}"))
-        canvas, step_m = registered(group)
-        stretch, found = self._read(canvas, group)
+        laid, step_m = overlaid(group)
+        stretch, found = self._read(laid, group)
         head, tail = overlap_textures(
-            canvas,
             group,
+            first=int(laid.frame_index[0]),
+            width=laid.columns.shape[0],
             group_step_m=self.cartridge.bench.sequence.group_step_m,
-            texture_of=lambda columns: ndimage.gaussian_filter(canvas.mean[:, columns], 1.0, order=(0, 1)),
+            texture_of=lambda columns: ndimage.gaussian_filter(laid.columns[columns].T, 1.0, order=(0, 1)),
         )
         return replace(self._trace(group, stretch, found, exposure_flags, step_m), head=head, tail=tail)
 
@@ -189,7 +191,7 @@ class TexturePickup:
         group, _ = self.cartridge.exposure.sort_out(group)
         if not group.valid.any() or not self.taught:
             return None
-        stretch, found = self._read(registered(group)[0], group)
+        stretch, found = self._read(overlaid(group)[0], group)
         image = group.images[int(np.flatnonzero(group.valid)[0])]
         model = self.lessons[-1].whole
         layout = model.layout
@@ -222,10 +224,10 @@ class TexturePickup:
         walls = np.array([support[self.layout.wall == wall].max(axis=0, initial=0.0) for wall in (INNER, OUTER)])
         return Stretch(columns, usable, burnt, settled(path, walls, cut, self.cartridge.rules), support)
 
-    def _read(self, canvas: Canvas, group: FrameGroup) -> tuple[Stretch, Evidence]:
+    def _read(self, laid: Overlay, group: FrameGroup) -> tuple[Stretch, Evidence]:
         fold = self.fold.get(group.number)
         models = [lesson.whole if fold is None else lesson.without[fold] for lesson in self.lessons]
-        stretch = self.stretch(*laid_out(canvas, group.white_level))
+        stretch = self.stretch(*laid_out(laid, group.white_level))
         return read(stretch, models, self.cartridge.bench.disc.cut, self.cartridge.rules)
 
     def _trace(
@@ -280,10 +282,9 @@ UNSEEN = Quality.NO_STRIPE | Quality.INTERPOLATED
 UNTAUGHT = "too little of the stripes is seen to learn their texture; the recipe seed-paper reads single groups"
 
 
-def laid_out(canvas: Canvas, white_level: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return a canvas column by column, which columns rest on enough frames, and what is burnt out."""
-    columns = np.ascontiguousarray(canvas.mean.T)
-    return columns, canvas.frames * 2 >= canvas.frames.max(), columns >= NEARLY_WHITE * white_level
+def laid_out(laid: Overlay, white_level: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a group's mean column by column, which columns rest on enough frames, and what is burnt out."""
+    return laid.columns, laid.frames * 2 >= laid.frames.max(), laid.columns >= NEARLY_WHITE * white_level
 
 
 def samples_of(stretch: Stretch, found: Evidence) -> tuple[FloatArray, FloatArray]:

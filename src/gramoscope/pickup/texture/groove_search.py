@@ -22,30 +22,36 @@ from gramoscope.pickup.texture.sharpness import ridges
 
 
 @numba.njit(cache=True, nogil=True)
+def _better(from_, cost, number, top, choice):  # type: ignore[no-untyped-def]
+    for j in range(top.size):
+        value = from_[j] - cost
+        better = value > top[j]
+        top[j] = value if better else top[j]
+        choice[j] = number if better else choice[j]
+
+
+@numba.njit(cache=True, nogil=True)
 def best_path(score, largest_step, step_cost):  # type: ignore[no-untyped-def]
     """Return the path through score[cell, i, j] with the largest sum, and that sum (A. Viterbi, 1967).
 
-    From cell to cell i and j change by at most `largest_step[0]` and `[1]`, each at a cost of its `step_cost` times the
+    Quickest where the last axis is the long one. From cell to cell i and j change by at most `largest_step[0]` and `[1]`, each at a cost of its `step_cost` times the
     square of the change.
     """
     cells, rows, columns = score.shape
+    reach_i, reach_j = largest_step[0], largest_step[1]
     best = score[0].copy()
     back = np.zeros((cells, rows, columns), np.int16)
-    new = np.empty((rows, columns))
+    new = np.empty((rows, columns), score.dtype)
     for cell in range(1, cells):
+        new[:] = -np.inf
         for i in range(rows):
-            for j in range(columns):
-                top = -np.inf
-                choice = 0
-                for di in range(-min(largest_step[0], i), min(largest_step[0], rows - 1 - i) + 1):
-                    cost = step_cost[0] * di * di
-                    for dj in range(-min(largest_step[1], j), min(largest_step[1], columns - 1 - j) + 1):
-                        value = best[i + di, j + dj] - cost - step_cost[1] * dj * dj
-                        if value > top:
-                            top = value
-                            choice = (di + largest_step[0]) * (2 * largest_step[1] + 1) + dj + largest_step[1]
-                new[i, j] = top + score[cell, i, j]
-                back[cell, i, j] = choice
+            for di in range(-min(reach_i, i), min(reach_i, rows - 1 - i) + 1):
+                for dj in range(-reach_j, reach_j + 1):
+                    number = np.int16((di + reach_i) * (2 * reach_j + 1) + dj + reach_j)
+                    cost = score.dtype.type(step_cost[0] * di * di + step_cost[1] * dj * dj)
+                    here, there = slice(max(-dj, 0), columns - max(dj, 0)), slice(max(dj, 0), columns - max(-dj, 0))
+                    _better(best[i + di, there], cost, number, new[i, here], back[cell, i, here])
+        new += score[cell]
         best[:] = new
     path = np.empty((2, cells), np.int64)
     end = np.argmax(best)
@@ -54,10 +60,18 @@ def best_path(score, largest_step, step_cost):  # type: ignore[no-untyped-def]
     path[0, -1], path[1, -1] = i, j
     for cell in range(cells - 1, 0, -1):
         choice = back[cell, i, j]
-        i += choice // (2 * largest_step[1] + 1) - largest_step[0]
-        j += choice % (2 * largest_step[1] + 1) - largest_step[1]
+        i += choice // (2 * reach_j + 1) - reach_i
+        j += choice % (2 * reach_j + 1) - reach_j
         path[0, cell - 1], path[1, cell - 1] = i, j
     return path, total
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_stripe(wide, rows, seen, absent, score):  # type: ignore[no-untyped-def]
+    for cell in range(score.shape[0]):
+        for place in range(rows.size):
+            if seen[place]:
+                score[cell, place] += wide[cell, rows[place]] - absent
 
 
 @dataclass(frozen=True)
@@ -139,12 +153,12 @@ class GrooveSearch:
             rows = np.round(rest + lateral[:, None] + sign * vertical).astype(np.int64)
             depth = from_bottom - vertical
             seen = (rows >= low) & (rows <= high) & (depth > BOTTOM_PX) & (depth < layout.half_width_px)
-            score[:, seen] += wide[:, rows[seen]] - self.absent
+            _add_stripe(wide, rows.ravel(), seen.ravel(), self.absent, score.reshape(len(ridge), -1))
         steps = np.array([1 if use else int(len(ridge) > 1) for use in used])
         # what the cut does not use changes slowly: a step of one grid point costs as much as a cell without its stripes
         costs = np.array([self.step_cost * GRID_PX if use else 1.0 for use in used])
-        path, _ = best_path(score, steps, costs)
-        return lateral[path[0]].astype(np.float64), vertical[path[1]].astype(np.float64)
+        path, _ = best_path(np.ascontiguousarray(score.transpose(0, 2, 1)), steps[::-1], costs[::-1])
+        return lateral[path[1]].astype(np.float64), vertical[path[0]].astype(np.float64)
 
     def _own_paths(self, ridge: FloatArray, layout: StripeLayout, common: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Let each wall look for its stripes, row by row, near the common path."""
@@ -153,9 +167,9 @@ class GrooveSearch:
         for wall in (INNER, OUTER):
             found = _ridges_at(ridge, layout.of_wall(wall), common[wall][:, None] + aside)
             pull = -0.3 * self.step_cost * aside.astype(np.float64) ** 2
-            steps, costs = np.array([3, 0]), np.array([self.step_cost, 0.0])
-            own, _ = best_path((found.sum(axis=0) + pull)[:, :, None], steps, costs)
-            path[wall] += aside[own[0]]
+            steps, costs = np.array([0, 3]), np.array([0.0, self.step_cost])
+            own, _ = best_path((found.sum(axis=0) + pull)[:, None, :], steps, costs)
+            path[wall] += aside[own[1]]
         near = np.arange(-2, 3)
         support = np.zeros((layout.wall.size, len(ridge)))
         for wall in (INNER, OUTER):
