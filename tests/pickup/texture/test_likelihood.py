@@ -11,7 +11,7 @@ import pytest
 from scipy import fft, ndimage
 
 from gramoscope.pickup.texture import likelihood
-from gramoscope.pickup.texture.following import follow
+from gramoscope.pickup.texture.following import GENTLE, REACH, across, follow
 from gramoscope.pickup.texture.likelihood import (
     TAPER_PX,
     StripeStatistics,
@@ -30,6 +30,12 @@ BLUR_PX_PER_ROW = 0.35
 SMOOTH_ROWS = 1.5
 NOISE = 0.01
 MOVE_PX = 0.2
+
+
+def _seen(picture: np.ndarray, path: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Window and derivative."""
+    wide = follow(picture, path, HALF_PX)
+    return np.ascontiguousarray(wide[REACH:-REACH]), across(wide, GENTLE)
 
 
 def _response(away: np.ndarray, frequency: np.ndarray) -> np.ndarray:
@@ -97,7 +103,7 @@ def known() -> Known:
 
 
 def _said(picture: np.ndarray, known: Known, move_px: float = 0.0) -> np.ndarray:
-    window, derivative = follow(picture, np.full(WIDTH, SHARP_ROW + move_px), HALF_PX)
+    window, derivative = _seen(picture, np.full(WIDTH, SHARP_ROW + move_px))
     weight = np.ones(WIDTH, np.float32)
     return witnesses(window, derivative, weight, known.statistics, band=BAND, length=LENGTH)[:, 40:-40]
 
@@ -237,7 +243,7 @@ def test_columns_without_weight_do_not_speak_into_their_neighbours(known: Known)
     spoilt[430:520] += 40 * rng.normal(size=(90, HEIGHT)).astype(np.float32)
     path = np.full(WIDTH, SHARP_ROW)
     clean, dirty = (
-        witnesses(*follow(one, path, HALF_PX), weight, known.statistics, band=BAND, length=LENGTH) * weight
+        witnesses(*_seen(one, path), weight, known.statistics, band=BAND, length=LENGTH) * weight
         for one in (picture, spoilt)
     )
     np.testing.assert_allclose(dirty / clean.std(axis=1)[:, None], clean / clean.std(axis=1)[:, None], atol=0.02)

@@ -239,3 +239,15 @@ def test_where_texture_tells_little_paths_are_better_when_both_sides_are_heard(
         for side, spread in ((0.0, 0.5), (-0.5, 0.0), (0.5, 0.0))
     )
     np.testing.assert_allclose(both, (low + high) / 2, rtol=1e-6, atol=1e-9)
+
+
+def test_a_tone_is_laid_upon_a_picture_once(another: Stretch) -> None:
+    tone = Tone(100.0, 0.9)
+    before = another.columns.copy()
+    seen = another.in_tone(tone)
+    np.testing.assert_array_equal(seen.columns, tone(before))
+    np.testing.assert_array_equal(another.columns, before)
+    assert seen.in_tone(tone) is seen
+    assert another.in_tone(Tone(80.0, 0.0)) is another
+    with pytest.raises(AssertionError):
+        seen.in_tone(Tone(100.0, 0.5))

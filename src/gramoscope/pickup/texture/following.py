@@ -14,7 +14,6 @@ import numba
 import numpy as np
 
 from gramoscope.conventions import Float32Array, FloatArray
-from gramoscope.pickup.texture.tone import Tone
 
 TAPS = 10
 PHASES = 512
@@ -45,7 +44,6 @@ def interpolation_taps(fraction: FloatArray) -> Float32Array:
 _TAPS = interpolation_taps(np.arange(PHASES + 1) / PHASES)
 
 
-AS_IT_IS = Tone()
 REACH = 7
 """Rows that a derivative needs on each side."""
 GENTLE = np.array([45.0, -9.0, 1.0]) / 60
@@ -74,11 +72,8 @@ def follow(
     columns: Float32Array,
     path_row: FloatArray,
     half_px: int,
-    tone: Tone = AS_IT_IS,
-    *,
-    slope: FloatArray = GENTLE,
-) -> tuple[Float32Array, Float32Array]:
-    """Return a window of rows about a path, and its derivative with the path.
+) -> Float32Array:
+    """Return a window of rows about a path, and as many more on each side as derivatives need.
 
     Parameters
     ----------
@@ -87,22 +82,17 @@ def follow(
     path_row : float64 array, shape (column,)
         Row of the path in each column; where the window leaves the picture its outermost row is repeated.
     half_px : int
-        Rows on each side of the path.
-    tone : Tone
-        In which grey levels are seen, before they are interpolated: bright grains ring less then.
-    slope : float64 array
-        How the derivative is taken: `GENTLE` or `SHARP`.
+        Rows of the window on each side of the path.
 
     Returns
     -------
-    window : float32 array, shape (2 half_px + 1, column)
-        Row j shows the picture at path_row + j − half_px.
-    derivative : float32 array, same shape
-        d(window)/d(path_row), grey levels a row; see `across`.
+    float32 array, shape (2 (half_px + 7) + 1, column)
+        Row j shows the picture at path_row + j − half_px − 7. The window proper is `[REACH:-REACH]`; `across` of the whole
+        is its derivative with the path.
     """
     wide = np.empty((2 * (half_px + REACH) + 1, columns.shape[0]), np.float32)
-    _follow(columns, path_row, _TAPS, np.float32(tone.level), np.float32(tone.compression), wide)
-    return np.ascontiguousarray(wide[REACH:-REACH]), across(wide, slope)
+    _follow(columns, path_row, _TAPS, wide)
+    return wide
 
 
 def across(rows: Float32Array, slope: FloatArray) -> Float32Array:
@@ -126,7 +116,7 @@ def across(rows: Float32Array, slope: FloatArray) -> Float32Array:
 
 
 @numba.njit(cache=True, nogil=True)
-def _follow(columns, path_row, taps, level, compression, window):  # type: ignore[no-untyped-def]
+def _follow(columns, path_row, taps, window):  # type: ignore[no-untyped-def]
     rows, width = window.shape
     half = rows // 2
     height = columns.shape[1]
@@ -141,23 +131,19 @@ def _follow(columns, path_row, taps, level, compression, window):  # type: ignor
         else:
             for j in range(stretch.size):
                 stretch[j] = columns[x, min(max(first + j, 0), height - 1)]
-        if compression > 0:
-            _see(stretch, level, compression)
         _interpolate(stretch, taps[phase], value)
         for j in range(rows):
             window[j, x] = value[j]
 
 
 @numba.njit(cache=True, nogil=True)
-def _see(grey, level, compression):  # type: ignore[no-untyped-def]
-    for j in range(grey.size):
-        grey[j] = level / compression * np.log1p(compression * (max(grey[j], np.float32(0)) / level - np.float32(1)))
-
-
-@numba.njit(cache=True, nogil=True)
 def _interpolate(stretch, taps, value):  # type: ignore[no-untyped-def]
     value[:] = np.float32(0)
     for i in range(taps.size):
-        w = taps[i]
-        for j in range(value.size):
-            value[j] += w * stretch[i + j]
+        _add_scaled(taps[i], stretch[i : i + value.size], value)
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_scaled(w, row, value):  # type: ignore[no-untyped-def]
+    for j in range(value.size):
+        value[j] += w * row[j]

@@ -34,7 +34,8 @@ def _better(from_, cost, number, top, choice):  # type: ignore[no-untyped-def]
 def best_path(score, largest_step, step_cost):  # type: ignore[no-untyped-def]
     """Return the path through score[cell, i, j] with the largest sum, and that sum (A. Viterbi, 1967).
 
-    Quickest where the last axis is the long one. From cell to cell i and j change by at most `largest_step[0]` and `[1]`, each at a cost of its `step_cost` times the
+    Quickest where the last axis is the long one.
+    From cell to cell i and j change by at most `largest_step[0]` and `[1]`, each at a cost of its `step_cost` times the
     square of the change.
     """
     cells, rows, columns = score.shape

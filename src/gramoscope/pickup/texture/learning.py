@@ -137,11 +137,14 @@ class Learning:
         choice = int(np.argmin(self.loading))
         for number, loading in enumerate(self.loading):
             if number == choice:
-                blanks += [self._whitening(blank, stretches, rules, spread) for blank in toned[1:]]
+                blanks += [self._whitening(b, _seen_in(b, stretches, spread), rules, spread) for b in toned[1:]]
             before = lessons[-1].whole if lessons else None
             spread_px = self.spread_px(before, rules)
             blanks = [replace(blank, spread_px=spread_px) for blank in blanks]
-            tried = [self._lesson(stretches, fold, blank, before, loading, rules, spread) for blank in blanks]
+            tried = [
+                self._lesson(_seen_in(blank, stretches, spread), fold, blank, before, loading, rules, spread)
+                for blank in blanks
+            ]
             lesson = max(tried, key=lambda one: one.whole.precision)
             blanks = [replace(lesson.whole, stripes=())]
             stretches = self._improved(stretches, fold, lesson, cut, rules, spread)
@@ -162,7 +165,8 @@ class Learning:
 
         def moved(pair: tuple[Stretch, int]) -> Stretch:
             stretch, left = pair
-            return stretch.moved(step(evidence(stretch, lesson.without[left], rules), cut, rules))
+            seen = stretch.in_tone(lesson.whole.tone)
+            return stretch.moved(step(evidence(seen, lesson.without[left], rules), cut, rules))
 
         return list(spread(moved, zip(stretches, fold, strict=True)))
 
@@ -336,6 +340,11 @@ class Learning:
         powers = np.sum([power for power, _ in quiet], axis=0) / max(sum(size for _, size in quiet), 1e-12)
         answers = np.sum([answer for _, _, answer in told], axis=0) / columns
         return mean, answers, powers
+
+
+def _seen_in(model: Model, stretches: list[Stretch], spread: Spread) -> list[Stretch]:
+    """All stretches in the tone of a model."""
+    return list(spread(lambda stretch: stretch.in_tone(model.tone), stretches))
 
 
 MOVE_PX = 0.1

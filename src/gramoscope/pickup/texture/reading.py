@@ -16,12 +16,13 @@ from scipy import ndimage
 
 from gramoscope.conventions import INNER, OUTER, BoolArray, Float32Array, FloatArray
 from gramoscope.disc.formats import Cut
-from gramoscope.pickup.texture.following import GENTLE, follow
+from gramoscope.pickup.texture.following import GENTLE, REACH, across, follow
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.likelihood import StripeStatistics, believable, quiet_power, softened, witnesses
 from gramoscope.pickup.texture.spectrum import Band, filtered
 from gramoscope.pickup.texture.tone import Tone
 
+AS_IT_IS = Tone()
 BURNT_SHARE = 0.15
 """Of the rows of a window in one column: a bright grain or two do no harm, a scratch does."""
 
@@ -42,6 +43,8 @@ class Stretch:
         The present path of each wall.
     support : float64 array, shape (stripe, column)
         How sharp the coarse search found each stripe.
+    tone : Tone
+        In which the picture is seen: before it is interpolated, for bright grains ring less then.
     """
 
     columns: Float32Array
@@ -49,6 +52,14 @@ class Stretch:
     burnt: BoolArray
     displacement_px: FloatArray
     support: FloatArray
+    tone: Tone = AS_IT_IS
+
+    def in_tone(self, tone: Tone) -> Stretch:
+        """Return the same stretch seen in a tone; only a picture that is as it was can be seen in another one."""
+        if tone == self.tone or tone.compression == self.tone.compression == 0:
+            return self
+        assert self.tone.compression == 0
+        return replace(self, columns=tone(self.columns), tone=tone)
 
     def moved(self, step_px: FloatArray) -> Stretch:
         """Return the same stretch with its paths moved, shape (2, column)."""
@@ -146,9 +157,9 @@ class Rules:
 def windows(
     stretch: Stretch, stripe_row: FloatArray, model: Model, *, slope: FloatArray = GENTLE
 ) -> tuple[Float32Array, Float32Array]:
-    """Return the whitened window about a path and its derivative, shape (row, column)."""
-    window, derivative = follow(stretch.columns, stripe_row, model.half_px, model.tone, slope=slope)
-    return filtered(window, model.whitener), filtered(derivative, model.whitener)
+    """Return the whitened window about a path, in the model's tone, and its derivative, shape (row, column)."""
+    wide = filtered(follow(stretch.in_tone(model.tone).columns, stripe_row, model.half_px), model.whitener)
+    return np.ascontiguousarray(wide[REACH:-REACH]), across(wide, slope)
 
 
 def clear_columns(
@@ -258,6 +269,9 @@ def _smoothed(score: FloatArray, information: FloatArray, smooth_px: float, rule
 
 def read(stretch: Stretch, models: Sequence[Model], cut: Cut, rules: Rules) -> tuple[Stretch, Evidence]:
     """Return the stretch with its path improved by one round with each model, and the evidence about that path."""
+    seen = stretch
     for model in models:
-        stretch = stretch.moved(step(evidence(stretch, model, rules), cut, rules))
-    return stretch, evidence(stretch, models[-1], rules)
+        if seen.tone != model.tone:
+            seen = replace(stretch, displacement_px=seen.displacement_px).in_tone(model.tone)
+        seen = seen.moved(step(evidence(seen, model, rules), cut, rules))
+    return seen, evidence(seen, models[-1], rules)
