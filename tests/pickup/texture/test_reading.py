@@ -18,6 +18,7 @@ from gramoscope.pickup.texture.reading import (
     Model,
     Rules,
     Stretch,
+    both_sides,
     clear_columns,
     evidence,
     read,
@@ -235,7 +236,9 @@ def test_where_texture_tells_little_paths_are_better_when_both_sides_are_heard(
     statistics = models[-1].stripes[0]
     assert statistics is not None
     both, low, high = (
-        witnessed(another, row + side, weight, replace(models[-1], spread_px=spread), statistics)
+        witnessed(
+            both_sides(another, row + side, replace(models[-1], spread_px=spread)), weight, models[-1], statistics
+        )
         for side, spread in ((0.0, 0.5), (-0.5, 0.0), (0.5, 0.0))
     )
     np.testing.assert_allclose(both, (low + high) / 2, rtol=1e-6, atol=1e-9)

@@ -33,7 +33,17 @@ from gramoscope.pickup.texture.likelihood import (
     quiet_power,
     softened,
 )
-from gramoscope.pickup.texture.reading import Model, Rules, Stretch, clear_columns, evidence, step, windows, witnessed
+from gramoscope.pickup.texture.reading import (
+    Model,
+    Rules,
+    Stretch,
+    both_sides,
+    clear_columns,
+    evidence,
+    step,
+    windows,
+    witnessed,
+)
 from gramoscope.pickup.texture.spectrum import Band, CrossSpectra, cross_spectra, precision, whitening_filter
 from gramoscope.pickup.texture.tone import Tone, mean_level
 
@@ -329,9 +339,12 @@ class Learning:
                 return None
             _, _, weight = laid
             row = blank.layout.rows(stretch.displacement_px)[number]
-            u = witnessed(stretch, row, weight, blank, statistics)
-            answers = [witnessed(stretch, row + side * MOVE_PX, weight, blank, statistics) @ weight for side in (-1, 1)]
-            return u, weight.astype(np.float64), (answers[0] - answers[1]) / (2 * MOVE_PX)
+            u, low, high = (
+                witnessed(both_sides(stretch, row + move, blank), weight, blank, statistics)
+                for move in (0.0, -MOVE_PX, MOVE_PX)
+            )
+            answer = (low - high) @ weight / (2 * MOVE_PX)
+            return u, weight.astype(np.float64), answer
 
         told = [one for one in spread(tried, zip(stretches, fold, strict=True)) if one is not None]
         columns = max(sum(float(w.sum()) for _, w, _ in told), 1.0)

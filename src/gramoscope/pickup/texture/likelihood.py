@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 from scipy import fft, ndimage
 
@@ -108,24 +109,52 @@ def witnesses(
         u₁ and u₂.
     """
     bins = band.bins(length)
+    width = window.shape[1]
     spectrum = fft.rfft(window * weight, length)
-    inside = np.ascontiguousarray(spectrum[:, bins].T)
-    both = np.stack([inside.real, inside.imag], axis=2)
-    explained = learned.inverse @ both
-    full = np.zeros_like(spectrum)
-    full[:, bins] = (explained[:, :, 0] + 1j * explained[:, :, 1]).T
-    y = fft.irfft(full, length)[:, : window.shape[1]]
-    full[:, bins] *= learned.noise
-    still = np.pad(fft.irfft(full, length)[:, : window.shape[1]], ((REACH, REACH), (0, 0))).astype(np.float32)
-    moving = np.subtract(derivative, across(still, GENTLE))
-    changed = learned.change @ explained
-    full[:, bins] = (changed[:, :, 0] + 1j * changed[:, :, 1]).T
-    turned = fft.irfft(full, length)[:, : window.shape[1]]
+    explained, still, turned = (np.zeros_like(spectrum) for _ in range(3))
+    _explain(
+        spectrum[:, bins],
+        learned.inverse,
+        learned.change,
+        learned.noise,
+        explained[:, bins],
+        still[:, bins],
+        turned[:, bins],
+    )
+    y, n_y, c_y = (fft.irfft(one, length)[:, :width] for one in (explained, still, turned))
+    moving = derivative - across(np.pad(n_y, ((REACH, REACH), (0, 0))), GENTLE)
     # as many degrees of freedom a column as rows, in the share of the spectrum that is used
     freedom = window.shape[0] * 2 * (bins.stop - bins.start) / length
     loudness = ndimage.gaussian_filter1d(np.einsum("ij,ij->j", window, y), LOUDNESS_PX, mode="nearest") / freedom
-    said = [np.einsum("ij,ij->j", moving, y), 0.5 * np.einsum("ij,ij->j", turned, y)]
+    said = [np.einsum("ij,ij->j", moving, y), 0.5 * np.einsum("ij,ij->j", c_y, y)]
     return np.asarray(-np.array(said, np.float64) / (TEMPER + np.maximum(loudness, 0.0)))
+
+
+@numba.njit(cache=True, nogil=True, fastmath={"contract"})
+def _add_product(matrix, x, out):  # type: ignore[no-untyped-def]
+    """Add the product of a symmetric matrix, row by row, which is column by column."""
+    for j in range(x.size):
+        row, w = matrix[j], x[j]
+        for i in range(out.size):
+            out[i] += w * row[i]
+
+
+@numba.njit(cache=True, nogil=True)
+def _explain(spectrum, inverse, change, noise, explained, still, turned):  # type: ignore[no-untyped-def]
+    """Write y = C⁻¹x, N y and C′y for each frequency of x, arrays of shape (row, bin)."""
+    rows, bins = spectrum.shape
+    x, y, z = np.empty((2, rows), np.float32), np.empty((2, rows), np.float32), np.empty((2, rows), np.float32)
+    for b in range(bins):
+        for i in range(rows):
+            x[0, i], x[1, i] = spectrum[i, b].real, spectrum[i, b].imag
+        y[:], z[:] = np.float32(0), np.float32(0)
+        for part in range(2):
+            _add_product(inverse[b], x[part], y[part])
+            _add_product(change[b], y[part], z[part])
+        for i in range(rows):
+            explained[i, b] = complex(y[0, i], y[1, i])
+            still[i, b] = complex(noise[b] * y[0, i], noise[b] * y[1, i])
+            turned[i, b] = complex(z[0, i], z[1, i])
 
 
 def best_shares(answers: FloatArray, powers: FloatArray) -> FloatArray:

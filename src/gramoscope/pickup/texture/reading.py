@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numba
 import numpy as np
 from scipy import ndimage
 
@@ -166,10 +167,20 @@ def clear_columns(
     stretch: Stretch, number: int, stripe_row: FloatArray, visible: BoolArray, half_px: int, rules: Rules
 ) -> BoolArray:
     """Tell in which columns a stripe is there and can be seen whole, by enough frames and without burnt places."""
-    height = stretch.columns.shape[1]
-    rows = np.clip(np.round(stripe_row)[:, None].astype(np.int64) + np.arange(-half_px, half_px + 1), 0, height - 1)
-    burnt = stretch.burnt[np.arange(rows.shape[0])[:, None], rows].mean(axis=1) > BURNT_SHARE
+    burnt = _burnt_share(stretch.burnt, stripe_row, half_px) > BURNT_SHARE
     return np.asarray(visible & stretch.usable & ~burnt & (stretch.support[number] >= rules.least_support))
+
+
+@numba.njit(cache=True, nogil=True)
+def _burnt_share(burnt, stripe_row, half_px):  # type: ignore[no-untyped-def]
+    """Share of the rows of a window that are burnt, column by column; beyond the picture its outermost row counts."""
+    width, height = burnt.shape
+    share = np.zeros(width)
+    for x in range(width):
+        middle = int(np.rint(stripe_row[x]))
+        for row in range(middle - half_px, middle + half_px + 1):
+            share[x] += burnt[x, min(max(row, 0), height - 1)]
+    return share / (2 * half_px + 1)
 
 
 def evidence(stretch: Stretch, model: Model, rules: Rules) -> Evidence:
@@ -185,9 +196,11 @@ def evidence(stretch: Stretch, model: Model, rules: Rules) -> Evidence:
         clear = clear_columns(stretch, number, row, visible[number], model.half_px, rules)
         if not clear.any():
             continue
-        clear &= believable(windows(stretch, row, model)[0], statistics.row_power, limits=rules.power_limits)
+        heard = both_sides(stretch, row, model)
+        for window, _ in heard:
+            clear &= believable(window, statistics.row_power, limits=rules.power_limits)
         weight = softened(clear)
-        u = statistics.share @ witnessed(stretch, row, weight, model, statistics)
+        u = statistics.share @ witnessed(heard, weight, model, statistics)
         weight64 = weight.astype(np.float64)
         u = (u - statistics.mean_score) * statistics.trust
         score[wall] += weight64 * u
@@ -198,16 +211,22 @@ def evidence(stretch: Stretch, model: Model, rules: Rules) -> Evidence:
         return Evidence(score, information, surprise[:, 0] / surprise[:, 1])
 
 
-def witnessed(
-    stretch: Stretch, stripe_row: FloatArray, weight: Float32Array, model: Model, statistics: StripeStatistics
-) -> FloatArray:
-    """Return what both witnesses say of a path, the mean of what they say on either side of it, shape (2, column)."""
+Sides = list[tuple[Float32Array, Float32Array]]
+
+
+def both_sides(stretch: Stretch, stripe_row: FloatArray, model: Model) -> Sides:
+    """Return windows and derivatives on either side of a path, or about the path itself where the model has no spread."""
     sides = (-model.spread_px, model.spread_px) if model.spread_px else (0.0,)
-    heard = [
-        witnesses(*windows(stretch, stripe_row + side, model), weight, statistics, band=model.band, length=model.length)
-        for side in sides
+    return [windows(stretch, stripe_row + side, model) for side in sides]
+
+
+def witnessed(heard: Sides, weight: Float32Array, model: Model, statistics: StripeStatistics) -> FloatArray:
+    """Return what both witnesses say of a path, the mean of what they say on either side of it, shape (2, column)."""
+    said = [
+        witnesses(window, derivative, weight, statistics, band=model.band, length=model.length)
+        for window, derivative in heard
     ]
-    return np.asarray(np.mean(heard, axis=0))
+    return np.asarray(np.mean(said, axis=0))
 
 
 def step(found: Evidence, cut: Cut, rules: Rules) -> FloatArray:

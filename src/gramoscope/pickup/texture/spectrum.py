@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 import numpy.typing as npt
 from scipy import fft, signal
@@ -69,13 +70,42 @@ def whitening_filter(power: FloatArray, band: Band) -> FloatArray:
     return np.asarray(taps - window * taps.sum() / window.sum())
 
 
+@numba.njit(cache=True, nogil=True, fastmath={"contract"})
+def _add_pair(w, before, after, out):  # type: ignore[no-untyped-def]
+    for x in range(out.size):
+        out[x] += w * (before[x] + after[x])
+
+
+@numba.njit(cache=True, nogil=True)
+def _filter(rows, half_taps, out):  # type: ignore[no-untyped-def]
+    """Filter each row by taps given from their middle on."""
+    height, width = rows.shape
+    half = half_taps.size - 1
+    wide = np.empty(width + 2 * half, np.float32)
+    for i in range(height):
+        wide[half : half + width] = rows[i]
+        for k in range(half):
+            wide[half - 1 - k] = rows[i, k]
+            wide[half + width + k] = rows[i, width - 1 - k]
+        here = wide[half : half + width]
+        _add_pair(np.float32(0.5) * half_taps[0], here, here, out[i])
+        for k in range(1, half + 1):
+            _add_pair(half_taps[k], wide[half - k : half - k + width], wide[half + k : half + k + width], out[i])
+
+
 def filtered(rows: Float32Array, taps: FloatArray) -> Float32Array:
-    """Return rows filtered along the columns by a symmetric filter; beyond the ends they are mirrored."""
-    width, half = rows.shape[-1], taps.size // 2
-    length = fft.next_fast_len(width + 2 * taps.size, real=True)
-    beyond = np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(half, half)], mode="symmetric")
-    out = fft.irfft(fft.rfft(beyond, length) * fft.rfft(taps.astype(np.float32), length), length)
-    return np.ascontiguousarray(out[..., 2 * half : 2 * half + width], np.float32)
+    """Return rows filtered along the columns by a symmetric filter; beyond the ends they are mirrored.
+
+    Parameters
+    ----------
+    rows : float32 array, shape (row, column)
+        At least half as many columns as taps.
+    taps : float64 array
+        An odd number of them.
+    """
+    out = np.zeros(rows.shape, np.float32)
+    _filter(rows, taps[taps.size // 2 :].astype(np.float32), out)
+    return out
 
 
 @dataclass(eq=False)
