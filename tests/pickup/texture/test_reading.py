@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from gramoscope.conventions import INNER, OUTER, FloatArray
 from gramoscope.disc.formats import Cut
@@ -21,6 +22,7 @@ from gramoscope.pickup.texture.reading import (
     both_sides,
     clear_columns,
     evidence,
+    gaussian,
     read,
     settled,
     step,
@@ -254,3 +256,11 @@ def test_a_tone_is_laid_upon_a_picture_once(another: Stretch) -> None:
     assert another.in_tone(Tone(80.0, 0.0)) is another
     with pytest.raises(AssertionError):
         seen.in_tone(Tone(100.0, 0.5))
+
+
+@pytest.mark.parametrize("sigma", [1.3, 12.0, 200.0])
+def test_smoothing_by_transforms_is_smoothing(sigma: float) -> None:
+    values = np.random.default_rng(2).normal(size=WIDTH) + 3
+    np.testing.assert_allclose(
+        gaussian(values, sigma), ndimage.gaussian_filter1d(values, sigma, mode="nearest"), atol=1e-9
+    )

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numba
 import numpy as np
-from scipy import ndimage
+from scipy import fft, ndimage
 
 from gramoscope.conventions import INNER, OUTER, BoolArray, Float32Array, FloatArray
 from gramoscope.disc.formats import Cut
@@ -264,8 +264,8 @@ def settled(displacement_px: FloatArray, support: FloatArray, cut: Cut, rules: R
     weight = support**2 + 1e-4
     inner, outer = weight
     both = inner * outer / (inner + outer)
-    apart = ndimage.gaussian_filter1d(both * (signed[OUTER] - signed[INNER]) / 2, rules.smooth_other_px, mode="nearest")
-    apart = apart / ndimage.gaussian_filter1d(both, rules.smooth_other_px, mode="nearest")
+    apart = gaussian(both * (signed[OUTER] - signed[INNER]) / 2, rules.smooth_other_px)
+    apart = apart / gaussian(both, rules.smooth_other_px)
     middle = (weight * (signed + np.array([[1.0], [-1.0]]) * apart)).sum(axis=0) / weight.sum(axis=0)
     return np.asarray(sign * (middle + np.array([[-1.0], [1.0]]) * apart))
 
@@ -277,12 +277,27 @@ def _smoothing_px(information: FloatArray, rules: Rules) -> float:
     return float(np.clip(wanted, rules.smooth_px, 2 * rules.smooth_px))
 
 
+FEW_PX = 40.0
+"""Kernels of a smaller σ are quicker without transforms."""
+
+
+def gaussian(values: FloatArray, sigma: float) -> FloatArray:
+    """Return values smoothed by a Gaussian that is cut off at four σ; beyond the ends the last value is held."""
+    if sigma < FEW_PX:
+        return np.asarray(ndimage.gaussian_filter1d(values, sigma, mode="nearest"))
+    radius = int(4 * sigma + 0.5)
+    bell = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
+    held = np.pad(values, radius, mode="edge")
+    length = fft.next_fast_len(held.size, real=True)
+    smooth = fft.irfft(fft.rfft(held, length) * fft.rfft(bell / bell.sum(), length), length)
+    return np.asarray(smooth[2 * radius : 2 * radius + values.size])
+
+
 def _smoothed(score: FloatArray, information: FloatArray, smooth_px: float, rules: Rules) -> FloatArray:
     most = float(information.max(initial=0.0))
     if most == 0:
         return np.zeros_like(score)
-    top = ndimage.gaussian_filter1d(score, smooth_px, mode="nearest")
-    bottom = ndimage.gaussian_filter1d(information, smooth_px, mode="nearest")
+    top, bottom = gaussian(score, smooth_px), gaussian(information, smooth_px)
     return np.clip(top / np.maximum(bottom, 0.05 * most), -rules.largest_step_px, rules.largest_step_px)
 
 
