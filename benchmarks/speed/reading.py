@@ -1,0 +1,176 @@
+"""How fast is the recipe `best`, from frames in memory to velocities, stage by stage?
+
+    python -m benchmarks.speed.reading [--groups 32] [--table benchmarks/speed/reading.md]
+
+Films a melody with the simulator (12 frames of 1280 × 512 a group), lets the cartridge learn, and times each stage on one
+thread, then the whole on one and on two. Bytes and shares are those of the roofline (`ceilings`), measured in the same run.
+The real-time factor is the time that a stretch of groove sounds over the time that it takes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.accuracy.table import line_of
+from benchmarks.speed.ceilings import Ceilings, measured_ceilings, seconds
+from gramoscope.apparatus.capture import Capture, open_capture
+from gramoscope.disc.formats import direction_of_cut
+from gramoscope.pickup.overlay import overlay
+from gramoscope.pickup.registration import frame_shifts
+from gramoscope.pickup.texture.reading import evidence
+from gramoscope.pickup.texture.sharpness import sharpness
+from gramoscope.pickup.texture_likelihood import TexturePickup, laid_out, samples_of
+from gramoscope.player.play import learned
+from gramoscope.player.recipe import load_recipe
+from gramoscope.preamp.resample import Resampler
+from gramoscope.signal_path import FrameGroup, GrooveMotion, WallTrace
+from gramoscope.simulation.demo_sound import demo_sound
+from gramoscope.simulation.film_sound import film_sound
+from gramoscope.simulation.scene import filming_bench, named_scene
+from gramoscope.tonearm.follow import Tonearm
+
+Row = tuple[str, float, float]
+"""Stage, seconds a group, bytes of film that it has to read."""
+
+
+def filmed_capture(folder: Path, groups: int) -> Capture:
+    """Film a melody into a folder."""
+    bench = filming_bench(height_px=512)
+    seconds_needed = groups * bench.sequence.group_step_m / float(bench.rotation.speed_at_m_s(0.0))
+    sound, rate_hz = demo_sound(seconds=seconds_needed)
+    film_sound(sound, rate_hz, named_scene(bench), folder, overwrite=True, workers=2)
+    return open_capture(folder)
+
+
+def reading_stages(pickup: TexturePickup, group: FrameGroup) -> list[Row]:
+    """Time the stages of reading one stretch."""
+    film = float(group.images.nbytes)
+    shift, _ = frame_shifts(group)
+    index = np.arange(len(shift))
+    laid = overlay(group.images, shift, index)
+    columns, usable, burnt = laid_out(laid, group.white_level)
+    cartridge = pickup.cartridge
+    cut = cartridge.bench.disc.cut
+    sharp = sharpness(columns)
+    stretch = pickup.stretch(columns, usable, burnt)
+    model = pickup.lessons[-1].whole
+    seen = stretch.in_tone(model.tone)
+    found = evidence(seen, model, cartridge.rules)
+    rounds = len(pickup.lessons) + 1
+    return [
+        ("how far the record turned", seconds(lambda: frame_shifts(group)), 0.0),
+        ("frames laid over each other", seconds(lambda: overlay(group.images, shift, index)), film),
+        ("sharpness", seconds(lambda: sharpness(columns)), 0.0),
+        ("coarse search", seconds(lambda: cartridge.search.find(sharp, pickup.layout, cut=cut)), 0.0),
+        ("tone", seconds(lambda: model.tone(columns)), 0.0),
+        (
+            f"likelihood, {rounds} rounds",
+            rounds * seconds(lambda: evidence(seen, model, cartridge.rules)),
+            0.0,
+        ),
+        ("samples", seconds(lambda: samples_of(seen, found)), 0.0),
+        ("reading, one thread, whole", seconds(lambda: pickup.read(group)), film),
+    ]
+
+
+def read_by(pickup: TexturePickup, groups: list[FrameGroup], threads: int) -> tuple[list[WallTrace], float]:
+    """Read all groups; return what was read and the seconds that a group took."""
+    with ThreadPoolExecutor(threads) as pool:
+        started = time.perf_counter()
+        traces = list(pool.map(pickup.read, groups))
+        return traces, (time.perf_counter() - started) / len(groups)
+
+
+def timed(work: Callable[[], object], groups: int) -> float:
+    """Return the seconds a group of something that is done once."""
+    started = time.perf_counter()
+    work()
+    return (time.perf_counter() - started) / groups
+
+
+def following_stages(capture: Capture, traces: list[WallTrace]) -> list[Row]:
+    """Time what comes after the pickup, which is one stream."""
+    recipe, bench = load_recipe("best"), capture.bench
+    direction, count = direction_of_cut(bench.disc.cut), len(traces)
+    spliced: list[WallTrace] = []
+    motion: list[GrooveMotion] = []
+    arm = Tonearm(bench.rotation, direction, bench.disc.wall_angle_rad, bench.passage_length_m, recipe.smoother)
+    resampler = Resampler(bench.rotation, direction, 96_000.0, recipe.passband)
+    list(arm.follow(trace for trace, _ in recipe.splice.join(iter(traces))))  # compiles
+    return [
+        ("splice", timed(lambda: spliced.extend(t for t, _ in recipe.splice.join(iter(traces))), count), 0.0),
+        ("tonearm", timed(lambda: motion.extend(arm.follow(iter(spliced))), count), 0.0),
+        ("place to time", timed(lambda: list(resampler.resample(iter(motion))), count), 0.0),
+    ]
+
+
+def measured_rows(groups: int) -> tuple[list[Row], Capture, int]:
+    """Return all rows, the capture, and the pixels of a group."""
+    with tempfile.TemporaryDirectory() as folder:
+        capture = filmed_capture(Path(folder) / "film", groups)
+        pickup = learned(capture, load_recipe("best"), 2)
+        assert isinstance(pickup, TexturePickup)
+        film = [capture.group(number) for number in range(capture.group_count)]
+    rows = reading_stages(pickup, film[len(film) // 2])
+    traces, alone = read_by(pickup, film, 1)
+    again, together = read_by(pickup, film, 2)
+    assert all(np.array_equal(a.offset_m, b.offset_m, equal_nan=True) for a, b in zip(traces, again, strict=True))
+    after = following_stages(capture, traces)
+    film_bytes = float(film[0].images.nbytes)
+    rows += [
+        ("reading, all groups, one thread", alone, film_bytes),
+        ("the same, two threads", together, film_bytes),
+        *after,
+    ]
+    rows.append(("in all, two threads", together + sum(row[1] for row in after), film_bytes))
+    return rows, capture, film[0].images.size
+
+
+def page(rows: list[Row], capture: Capture, pixels: int, ceilings: Ceilings) -> str:
+    """Return the table."""
+    bench = capture.bench
+    sounding_s = bench.sequence.group_step_m / float(bench.rotation.speed_at_m_s(0.0))
+    lines = [
+        "# Reading, timed",
+        "",
+        "    python -m benchmarks.speed.reading --table benchmarks/speed/reading.md",
+        "",
+        f"{bench.sequence.frames_per_group} frames of {bench.sensor.width_px} × {bench.sensor.height_px}, 8 bits, "
+        f"{bench.rotation.radius_m * 1e3:g} mm, frames in memory. Measured in the same run, on one thread: triad "
+        f"{ceilings.triad_bytes_s / 1e9:.1f} GB/s, {ceilings.fma_s / 1e9:.0f} · 10⁹ single-precision multiply-adds a second.",
+        "*Of the memory's rate*: what the stage has to read of the film, over what the triad moves in that time. "
+        "*Real-time factor*: 1 plays as fast as the record turns.",
+        "",
+        line_of(("stage", "ms a group", "ns a pixel of film", "of the memory's rate", "real-time factor")),
+        "|" + "---|" * 5,
+    ]
+    for name, spent, moved in rows:
+        share = f"{100 * moved / spent / ceilings.triad_bytes_s:.1f} %" if moved else "–"
+        lines.append(
+            line_of((name, f"{1e3 * spent:.2f}", f"{1e9 * spent / pixels:.2f}", share, f"{sounding_s / spent:.3f}"))
+        )
+    return "\n".join(lines) + "\n"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--groups", type=int, default=32)
+    parser.add_argument("--table", type=Path, help="page to write")
+    given = parser.parse_args()
+    rows, capture, pixels = measured_rows(given.groups)
+    text = page(rows, capture, pixels, measured_ceilings())
+    print(text)
+    if given.table is not None:
+        given.table.write_text(text, "utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
