@@ -143,22 +143,22 @@ class GrooveSearch:
         }[cut]
         lateral, vertical = (GRID_PX * np.arange(-int(r // GRID_PX), int(r // GRID_PX) + 1) for r in reach)
         # on a coarse grid a ridge is where any of its rows is
-        wide = np.maximum(ridge, np.maximum(np.roll(ridge, 1, axis=1), np.roll(ridge, -1, axis=1)))
+        wide = np.maximum(ridge, np.maximum(np.roll(ridge, 1, axis=1), np.roll(ridge, -1, axis=1))).astype(np.float32)
         used = [cut != "vertical", cut != "lateral"]
         large = [self.usual_swing_px if use else self.usual_drift_px for use in used]
-        usual = (lateral[:, None] / large[0]) ** 2 + (vertical / large[1]) ** 2
-        score = np.tile(-self.swing_cost * usual, (len(ridge), 1, 1))
+        usual = (lateral / large[0]) ** 2 + (vertical[:, None] / large[1]) ** 2
+        score = np.tile(np.float32(-self.swing_cost * usual), (len(ridge), 1, 1))
         signs = wall_sign(layout.wall)
         stripes = zip(layout.rest_row, signs, layout.first_row, layout.last_row, layout.from_bottom_px, strict=True)
         for rest, sign, low, high, from_bottom in stripes:
-            rows = np.round(rest + lateral[:, None] + sign * vertical).astype(np.int64)
-            depth = from_bottom - vertical
+            rows = np.round(rest + lateral + sign * vertical[:, None]).astype(np.int64)
+            depth = from_bottom - vertical[:, None]
             seen = (rows >= low) & (rows <= high) & (depth > BOTTOM_PX) & (depth < layout.half_width_px)
-            _add_stripe(wide, rows.ravel(), seen.ravel(), self.absent, score.reshape(len(ridge), -1))
+            _add_stripe(wide, rows.ravel(), seen.ravel(), np.float32(self.absent), score.reshape(len(ridge), -1))
         steps = np.array([1 if use else int(len(ridge) > 1) for use in used])
         # what the cut does not use changes slowly: a step of one grid point costs as much as a cell without its stripes
         costs = np.array([self.step_cost * GRID_PX if use else 1.0 for use in used])
-        path, _ = best_path(np.ascontiguousarray(score.transpose(0, 2, 1)), steps[::-1], costs[::-1])
+        path, _ = best_path(score, steps[::-1], costs[::-1])
         return lateral[path[1]].astype(np.float64), vertical[path[0]].astype(np.float64)
 
     def _own_paths(self, ridge: FloatArray, layout: StripeLayout, common: FloatArray) -> tuple[FloatArray, FloatArray]:
