@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gramoscope.conventions import Float32Array, FloatArray
-from gramoscope.pickup.registration import cubic_taps, frame_shifts, placement
+from gramoscope.pickup.registration import cubic_taps, frame_shifts, placement, widen
 from gramoscope.signal_path import FrameGroup, ImageArray
 
 BLOCK_ROWS = 16
@@ -41,12 +41,6 @@ class Overlay:
     frames: npt.NDArray[np.int64]
     shift_px: FloatArray
     frame_index: npt.NDArray[np.int64]
-
-
-@numba.njit(cache=True, nogil=True)
-def _widen(row, wide):  # type: ignore[no-untyped-def]
-    for x in range(row.size):
-        wide[x] = row[x]
 
 
 @numba.njit(cache=True, nogil=True, fastmath={"contract"})
@@ -78,7 +72,7 @@ def _overlay(images, shift_px, share, columns):  # type: ignore[no-untyped-def]
             start, stop, offset, fraction = placement(shift_px[k], width, canvas_width)
             taps = cubic_taps(fraction)
             for j in range(rows):
-                _widen(images[k, first + j], wide)
+                widen(images[k, first + j], wide)
                 # slices, for an index that may be negative keeps the loop from being vectorised
                 row = wide[start + offset - 1 : stop + offset + 2]
                 _add(row[:-3], row[1:-2], row[2:-1], row[3:], taps, total[j, start:stop])

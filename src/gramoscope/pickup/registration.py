@@ -189,7 +189,8 @@ def _texture_of_rows(image):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _widen(row, wide):  # type: ignore[no-untyped-def]
+def widen(row, wide):  # type: ignore[no-untyped-def]
+    """Write a row of integers as float32."""
     for x in range(row.size):
         wide[x] = row[x]
 
@@ -225,8 +226,8 @@ def _shift_correction(here, there, rows, shift_px):  # type: ignore[no-untyped-d
     h = wide_here[start - 2 : stop + 2]
     t = wide_there[start + offset - 2 : stop + offset + 3]
     for row in rows:
-        _widen(here[row], wide_here)
-        _widen(there[row], wide_there)
+        widen(here[row], wide_here)
+        widen(there[row], wide_there)
         s, c = _row_normal_equation(
             h[:-4], h[1:-3], h[2:-2], h[3:-1], h[4:], taps, t[:-5], t[1:-4], t[2:-3], t[3:-2], t[4:-1], t[5:]
         )
