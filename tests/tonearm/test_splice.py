@@ -222,3 +222,42 @@ def test_small_errors_of_matches_do_not_pile_up(monkeypatch: pytest.MonkeyPatch)
     # steady state of the filter: √(σ_match σ_encoder) = 0.32 µm
     assert error[200:].std() == pytest.approx(np.sqrt(0.05 * 2) * 1e-6, rel=0.35)
     assert np.abs(error).max() < 1.6e-6
+
+
+def _overlapping(places_m: list[np.ndarray]) -> list[WallTrace]:
+    """Stretches of 40 samples that share 10 with the next."""
+    blank = _traces(np.zeros(1), np.zeros(1))[0]
+    return [
+        replace(
+            blank,
+            number=i,
+            arc_start_m=30 * i * 3e-6,
+            arc_step_m=3e-6,
+            offset_m=place,
+            offset_sigma_m=np.full((2, 40), 5e-8),
+            flags=np.zeros((2, 40), np.uint16),
+        )
+        for i, place in enumerate(places_m)
+    ]
+
+
+def test_a_stretch_whose_stripe_was_taken_for_another_is_moved_onto_its_neighbour(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(Splice, "match", lambda self, tail, head: Match(0.0, 0.95, 0.0))
+    groove = 40e-6 * np.sin(np.arange(200) / 21.0)
+    rng = np.random.default_rng(7)
+    true = [groove[30 * i : 30 * i + 40] + np.array([[-60e-6], [60e-6]]) for i in range(5)]
+    read = [place + 1e-7 * rng.normal(size=place.shape) for place in true]
+    read[1] = read[1] + 3e-6  # a picture that moved is no mistake
+    read[2] = read[2] - 110e-6
+    read[2][1] = np.nan  # nor is anything of this wall seen
+    read[3] = read[3] - 37e-6
+    joined = [trace for trace, _ in SPLICE.join(iter(_overlapping(read)))]
+    left = [np.nanmedian(trace.offset_m - place) for trace, place in zip(joined, true, strict=True)]
+    np.testing.assert_allclose(left, [0, 3e-6, 3e-6, 3e-6, 0], atol=4e-7)
+    # the stretch before shows the inner wall alone: the other one goes along with it
+    np.testing.assert_allclose(np.mean(joined[3].offset_m - true[3], axis=1), 3e-6, atol=4e-7)
+    assert np.isnan(joined[2].offset_m[1]).all()
+    assert [len(trace.problems) for trace in joined] == [0, 0, 1, 1, 0]
+    assert "-113 µm aside" in joined[2].problems[-1]
