@@ -9,11 +9,6 @@ along a whole side.
 Across the groove the same peak says whether the picture moved by something else than the log of the stage knows: somebody
 touched the table, the stage slipped. On films of which the truth is known it says so to 5 nm (0.012 pixels, correlation
 0.97) and without bias. Where it is no chance, all that follows is moved back; the place of the walls is then continuous.
-
-Where a groove swings so far that one stripe alone stays in sight, that stripe can be taken for another one. The velocity is
-right all the same, and the place is off by the distance of both stripes. But the overlap is one piece of groove: what two
-stretches say of a wall there must agree, and a stretch that disagrees by more than reading can err is moved onto the one
-before.
 """
 
 from __future__ import annotations
@@ -36,8 +31,6 @@ COARSE = 3
 ROWS, COLUMNS = 2, 3
 """The lattice about the peak reaches so far to each side."""
 REFINEMENTS, NEWTON_ROUNDS = 4, 8
-LEAST_SHARED = 5
-"""Samples that both stretches must have seen of a wall, for its places to be compared."""
 LEAST_DISSIMILARITY = 0.01
 """No strips are more alike than that, as (1 − c)/c: the microscope itself is not that steady."""
 
@@ -134,32 +127,6 @@ def lattice_peak(values: FloatArray) -> tuple[float, float]:
     return float(place[0]), float(place[1])
 
 
-def overlap_disagreement(before: WallTrace, trace: WallTrace) -> FloatArray:
-    """Return how far a stretch sees each wall from where the one before saw it.
-
-    Parameters
-    ----------
-    before, trace : WallTrace
-        Where they really begin.
-
-    Returns
-    -------
-    float64 array, shape (2,)
-        Median over the samples that both saw; NaN for a wall of which they share fewer than `LEAST_SHARED`.
-    """
-    first = int(np.rint((trace.arc_start_m - before.arc_start_m) / before.arc_step_m))
-    shared = min(before.offset_m.shape[1] - first, trace.offset_m.shape[1])
-    aside = np.full(2, np.nan)
-    if first < 0 or shared < LEAST_SHARED:
-        return aside
-    for wall in range(2):
-        apart = trace.offset_m[wall, :shared] - before.offset_m[wall, first : first + shared]
-        seen = apart[np.isfinite(apart)]
-        if seen.size >= LEAST_SHARED:
-            aside[wall] = np.median(seen)
-    return aside
-
-
 @dataclass(frozen=True)
 class Match:
     """How the head of one stretch lies on the tail of the one before.
@@ -200,8 +167,6 @@ class Splice:
         Standard error of a match across the groove, of strips that correlate by one half; it falls with √((1 − c)/c).
     jump_sigmas : float
         A move of the picture across the groove that the log does not know is believed when it is so many standard errors.
-    mistaken_m : float
-        A wall that lies further than this from where the stretch before saw it was read from a stripe taken for another.
     """
 
     reach_m: float = 9e-6
@@ -212,7 +177,6 @@ class Splice:
     encoder_sigma_m: float = 3e-6
     row_sigma_m: float = 25e-9
     jump_sigmas: float = 6.0
-    mistaken_m: float = 15e-6
 
     def match(self, tail: Texture, head: Texture) -> Match:
         """Return how the head of a stretch lies on the tail of the one before."""
@@ -266,13 +230,12 @@ class Splice:
         ------
         trace : WallTrace
             `arc_start_m` corrected, and `offset_m` where the picture moved across the groove by more or less than the log
-            of the stage says, or where a stripe was taken for another one (its `problems` say so); flagged `NO_OVERLAP` when it could not be matched to the one before.
+            of the stage says; flagged `NO_OVERLAP` when it could not be matched to the one before.
         match : Match or None
             What the overlap said; None for the first stretch.
         """
         error, variance, moved = 0.0, 0.0, 0.0
         before: WallTrace | None = None
-        joined: WallTrace | None = None
         for trace in traces:
             match = None
             if before is not None:
@@ -281,23 +244,11 @@ class Splice:
                 moved += self._jump(match)
             lost = match is not None and np.isnan(match.error_m)
             flags = trace.flags | np.uint16(Quality.NO_OVERLAP) if lost else trace.flags
-            placed = replace(trace, arc_start_m=trace.arc_start_m + error, offset_m=trace.offset_m - moved, flags=flags)
-            if joined is not None and not lost:
-                placed = self._put_right(joined, placed)
-            yield placed, match
-            before, joined = trace, placed
-
-    def _put_right(self, before: WallTrace, trace: WallTrace) -> WallTrace:
-        """Move walls that were read from a stripe taken for another one onto what the stretch before says of them."""
-        aside = overlap_disagreement(before, trace)
-        mistaken = np.abs(aside) > self.mistaken_m
-        if not mistaken.any():
-            return trace
-        # a wall that the overlap does not show goes along with the other one
-        move = np.where(mistaken, aside, np.where(np.isnan(aside), aside[mistaken].mean(), 0.0))
-        told = ", ".join(f"{1e6 * one:.0f} µm" for one in aside[mistaken])
-        problem = f"group {trace.number}: a stripe was taken for another one, {told} aside; moved onto its neighbour"
-        return replace(trace, offset_m=trace.offset_m - move[:, None], problems=(*trace.problems, problem))
+            yield (
+                replace(trace, arc_start_m=trace.arc_start_m + error, offset_m=trace.offset_m - moved, flags=flags),
+                match,
+            )
+            before = trace
 
     def _match_traces(self, before: WallTrace, trace: WallTrace) -> Match:
         if before.tail is None or trace.head is None:
