@@ -1,9 +1,10 @@
 """One stretch read by what the passage taught: where its walls run, column by column, and how surely.
 
-The path is improved in a few rounds of Fisher scoring. Each round lays windows on both sides of the present path of every stripe that
-can be seen, takes their scores, weights them by how far they can be trusted, and moves the walls by the smoothed ratio of
-score and information. Rounds go from forgiving models to exact ones, the very models that were learned while the passage's
-own paths improved in the same way.
+The path is improved in a few rounds of Fisher scoring. Each round lays windows on both sides of the present path of every
+stripe that can be seen, takes their scores, weights them by how far they can be trusted, and moves the walls by the smoothed
+ratio of score and information. On both sides, because a path settles where its score is zero: there the score's noise looks
+like an answer, and a little further off it has been forgotten. Rounds go from forgiving models to exact ones, the very models
+that were learned while the passage's own paths improved in the same way.
 """
 
 from __future__ import annotations
