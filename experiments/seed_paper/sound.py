@@ -19,6 +19,7 @@ from gramoscope.listening import ink
 from gramoscope.listening.align import band_passed
 from gramoscope.listening.compare import Comparison, compare
 from gramoscope.listening.envelope import peak_envelope
+from gramoscope.listening.pair import trim_fade
 from gramoscope.listening.truth import truth_sound
 from gramoscope.listening.wav import read_sound
 from gramoscope.player.play import Settings, play
@@ -145,15 +146,26 @@ def _wave(axes: Axes, time_ms: FloatArray, sound: FloatArray, colour: str) -> No
     axes.set_xlim(float(time_ms[0]), float(time_ms[-1]))
 
 
+def _faded(sound: FloatArray, rate_hz: float) -> FloatArray:
+    """A sound as it is compared: what is trimmed fades, so that it does not ring into the rest."""
+    return sound * trim_fade(sound.size, round(TRIM_S * rate_hz))
+
+
 def waves_figure(heard: Heard) -> Figure:
     """Draw recorded and recovered waveform and envelope, as the paper's figures 6 and 8 do."""
     figure = ink.blank_figure(9.6, 4.6)
     panels = figure.subplots(2, 2, sharex=True, sharey="row")
     shift_s, gain = heard.found.delay_s, heard.found.polarity * 10 ** (-heard.found.gain_db / 20)
     recovered = (
-        band_passed(heard.recovered, rate_hz=heard.rate_hz, band_hz=heard.found.band_hz, advance_s=shift_s) * gain
+        band_passed(
+            _faded(heard.recovered, heard.rate_hz),
+            rate_hz=heard.rate_hz,
+            band_hz=heard.found.band_hz,
+            advance_s=shift_s,
+        )
+        * gain
     )
-    recorded = band_passed(heard.recorded, rate_hz=heard.rate_hz, band_hz=heard.found.band_hz)
+    recorded = band_passed(_faded(heard.recorded, heard.rate_hz), rate_hz=heard.rate_hz, band_hz=heard.found.band_hz)
     window = max(1, round(FIGURE_WINDOW_S * heard.rate_hz))
     names = ("a  Recorded", "b  Recovered", "c  Recorded, peak envelope", "d  Recovered, peak envelope")
     for column, (sound, colour) in enumerate(((recorded, ink.BLACK), (recovered, ink.BLUE))):

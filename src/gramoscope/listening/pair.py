@@ -206,7 +206,7 @@ class Pairing:
         used[:trim] = False
         used[len(used) - trim :] = False
         self._require_length(np.count_nonzero(used) / rate_hz, rate_hz=rate_hz)
-        fade = _fade(len(used), trim)
+        fade = trim_fade(len(used), trim)
         return Span(
             a=band_passed(fade * cut_a, rate_hz=rate_hz, band_hz=band_hz),
             b=band_passed(fade * cut_b, rate_hz=rate_hz, band_hz=band_hz, advance_s=advance_s),
@@ -234,8 +234,11 @@ class Pairing:
             )
 
 
-def _fade(count: int, trim: int) -> FloatArray:
-    """Rise over the trimmed head and fall over the trimmed tail, so that what is left out does not ring into the rest."""
+def trim_fade(count: int, trim: int) -> FloatArray:
+    """Return a weight that rises over the trimmed head and falls over the trimmed tail, 0 … 1, shape (count,).
+
+    What is left out must not ring into the rest when the whole is filtered.
+    """
     rise = np.sin(np.pi / 2 * np.arange(trim) / max(trim, 1)) ** 2
     return np.concatenate([rise, np.ones(count - 2 * trim), rise[::-1]])
 
