@@ -190,3 +190,15 @@ def test_loading_adds_a_share_of_the_mean_power_to_every_direction() -> None:
 
 def test_the_band_is_in_cycles_a_pixel() -> None:
     assert Band(0.02, 0.35).bins(1000) == slice(20, 351)
+
+
+@pytest.mark.parametrize("width", [1, 7, 25])
+def test_rows_shorter_than_the_filter_repeat_their_other_end(width: int) -> None:
+    rng = np.random.default_rng(5)
+    rows, half = rng.normal(size=(2, width)).astype(np.float32), rng.normal(size=21)
+    place = np.minimum(np.arange(20), width - 1)
+    beyond = np.concatenate([rows[:, place[::-1]], rows, rows[:, width - 1 - place]], axis=1)
+    taps = np.concatenate([half[:0:-1], half])
+    np.testing.assert_allclose(
+        filtered(rows, taps), [np.convolve(one, taps, mode="valid") for one in beyond], atol=3e-5
+    )

@@ -85,8 +85,10 @@ def _filter(rows, half_taps, out):  # type: ignore[no-untyped-def]
     for i in range(height):
         wide[half : half + width] = rows[i]
         for k in range(half):
-            wide[half - 1 - k] = rows[i, k]
-            wide[half + width + k] = rows[i, width - 1 - k]
+            # a row that is shorter than the mirror repeats its other end
+            mirrored = min(k, width - 1)
+            wide[half - 1 - k] = rows[i, mirrored]
+            wide[half + width + k] = rows[i, width - 1 - mirrored]
         here = wide[half : half + width]
         _add_pair(np.float32(0.5) * half_taps[0], here, here, out[i])
         for k in range(1, half + 1):
@@ -99,7 +101,6 @@ def filtered(rows: Float32Array, taps: FloatArray) -> Float32Array:
     Parameters
     ----------
     rows : float32 array, shape (row, column)
-        At least half as many columns as taps.
     taps : float64 array
         An odd number of them.
     """

@@ -36,10 +36,7 @@ class Tone:
         require(0 <= self.compression < 1, f"a compression of {self.compression}", "0 … below 1")
 
     def __call__(self, grey: Float32Array) -> Float32Array:
-        """Return how grey levels are seen, float32 array of the same shape; levels below 0 count as 0.
-
-        The reference of what `following.follow` does to the rows that it needs.
-        """
+        """Return how grey levels are seen, float32 array of the same shape; levels below 0 count as 0."""
         if self.compression == 0:
             return grey
         contrast = np.maximum(grey, 0) / np.float32(self.level) - 1
