@@ -22,8 +22,8 @@ def _dull(f: np.ndarray) -> np.ndarray:
 
 
 def _speech(f: np.ndarray) -> np.ndarray:
-    """With its breath and consonants, 36 dB below the rest and most of them below the readings' noise."""
-    return np.hypot(_dull(f), 4e-3 / (1 + (f / 11_000) ** 4))
+    """With breath and consonants as recordings have them, 31 dB below the rest and mostly below the readings' noise."""
+    return np.hypot(_dull(f), 7e-3 / (1 + (f / 11_000) ** 4))
 
 
 SPECTRA: dict[str, Callable[[np.ndarray], np.ndarray]] = {
@@ -35,8 +35,14 @@ SPECTRA: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "speech": _speech,
     "dull speech": _dull,
 }
-WIDE_COST = {"dull speech": 1.32}
-"""What it costs to expect breath where there is none."""
+WIDE_COST = {"wide": 1.3, "dull speech": 1.4, "1 kHz": 1.45}
+"""What it costs to expect breath, and the record's own noise, where there is none."""
+SURFACE_M_S = 0.03 * 10 ** (-36 / 20)
+"""Noise of a record's surface, 36 dB below the loud sounds here: as much as lacquer has, less than shellac."""
+
+
+def _surface(f: np.ndarray) -> np.ndarray:
+    return (f > 150) / (1 + (f / 11_000) ** 4)
 
 
 def _both(bench: Any, *, groups: int = GROUPS, vertical: float = 0.004, seed: int = 8) -> tuple[Any, Any]:
@@ -46,7 +52,7 @@ def _both(bench: Any, *, groups: int = GROUPS, vertical: float = 0.004, seed: in
     )
 
 
-@pytest.mark.parametrize("name", [*SPECTRA, "1 kHz", "4 kHz"])
+@pytest.mark.parametrize("name", [*SPECTRA, "1 kHz", "4 kHz", "1 kHz on a record", "4 kHz on a record"])
 def test_the_claimed_error_is_the_real_one(bench: Any, name: str) -> None:
     claims, errors = [], []
     for seed in (1, 2):
@@ -55,6 +61,9 @@ def test_the_claimed_error_is_the_real_one(bench: Any, name: str) -> None:
             lateral = bench.course(SPECTRA[name], 0.03, groups=GROUPS, seed=seed)
         else:
             lateral = bench.tone(1000.0 * float(name[0]), 0.03, groups=GROUPS)
+        if name.endswith("record"):
+            noise = bench.course(_surface, SURFACE_M_S, groups=GROUPS, seed=seed + 90)
+            lateral = replace(lateral, velocity_m_s=lateral.velocity_m_s + noise.velocity_m_s)
         heard = bench.hear(bench.traces(lateral, vertical, groups=GROUPS, seed=seed), lateral, vertical)
         assert not heard.flags[4:-4].any()
         claims.append([heard.claim(i, heard.measured) ** 2 for i in (LATERAL, VERTICAL)])
@@ -136,7 +145,8 @@ def test_a_direction_that_nothing_was_seen_of_is_unknown(bench: Any, lose: Calla
 def test_a_third_of_the_samples_may_be_wild(bench: Any, amplitude_m: float) -> None:
     worse, wrong, ratios = [], [], []
     for seed in range(5):
-        lateral, vertical = _both(bench, seed=seed)
+        lateral = bench.course(_speech, 0.03, groups=GROUPS, seed=seed)
+        vertical = bench.course(_speech, 0.004, groups=GROUPS, seed=seed + 50)
         traces, rng = bench.traces(lateral, vertical, groups=GROUPS), np.random.default_rng(seed)
         spoilt = []
         for trace in traces:
@@ -152,7 +162,8 @@ def test_a_third_of_the_samples_may_be_wild(bench: Any, amplitude_m: float) -> N
     # where half of a neighbourhood happens to agree on something else, nobody could tell
     assert np.median(worse) < 4
     assert np.max(np.mean(wrong, axis=0)) < 0.01
-    assert np.all(np.abs(np.mean(ratios, axis=0) - 1.05) < 0.25)
+    # with a third of the samples gone more of the breath drowns, and the claim has room for more than there is
+    assert np.all(np.abs(np.mean(ratios, axis=0) - 1.1) < 0.3)
     # both walls wild in three neighbouring samples
     assert ((heard.flags & Quality.OUTLIER) != 0).any()
 
