@@ -44,13 +44,14 @@ def interpolation_taps(fraction: FloatArray) -> Float32Array:
 _TAPS = interpolation_taps(np.arange(PHASES + 1) / PHASES)
 
 
-REACH = 7
-"""Rows that a derivative needs on each side."""
+REACH = 8
+"""Rows beyond a window on each side that its derivatives, and windows a little to the side of it, need."""
+LANES = 16
+"""Windows are laid out in memory so many rows at a time."""
 GENTLE = np.array([45.0, -9.0, 1.0]) / 60
 """Weights of x₁ − x₋₁, x₂ − x₋₂, x₃ − x₋₃ in a derivative that is exact up to the sixth degree and fades beyond a third of a
 cycle a row: it forgives rows that are too far apart for what they show."""
-
-
+SLOPE_ROWS = 7
 SLOPE_BETA = 6.0
 
 
@@ -60,19 +61,15 @@ def sharp_slope() -> FloatArray:
     Within 4 % to a third of a cycle, 6 % to four tenths, and even. The slope of the sinc series, (−1)^(k+1)/k, under a
     Kaiser window, scaled to be exact for a straight line.
     """
-    k = np.arange(1, REACH + 1)
-    taps = -((-1.0) ** k) / k * np.i0(SLOPE_BETA * np.sqrt(1 - (k / (REACH + 1)) ** 2))
+    k = np.arange(1, SLOPE_ROWS + 1)
+    taps = -((-1.0) ** k) / k * np.i0(SLOPE_BETA * np.sqrt(1 - (k / (SLOPE_ROWS + 1)) ** 2))
     return np.asarray(taps / np.sum(2 * k * taps))
 
 
 SHARP = sharp_slope()
 
 
-def follow(
-    columns: Float32Array,
-    path_row: FloatArray,
-    half_px: int,
-) -> Float32Array:
+def follow(columns: Float32Array, path_row: FloatArray, half_px: int) -> Float32Array:
     """Return a window of rows about a path, and as many more on each side as derivatives need.
 
     Parameters
@@ -86,64 +83,116 @@ def follow(
 
     Returns
     -------
-    float32 array, shape (2 (half_px + 7) + 1, column)
-        Row j shows the picture at path_row + j − half_px − 7. The window proper is `[REACH:-REACH]`; `across` of the whole
-        is its derivative with the path.
+    float32 array, shape (column, 2 (half_px + 8) + 1)
+        Row j shows the picture at path_row + j − half_px − 8; the window proper is `[:, REACH:-REACH]`.
     """
-    wide = np.empty((2 * (half_px + REACH) + 1, columns.shape[0]), np.float32)
-    _follow(columns, path_row, _TAPS, wide)
-    return wide
+    return np.ascontiguousarray(_followed(columns, path_row, half_px)[: columns.shape[0], : wide_rows(half_px)])
 
 
-def across(rows: Float32Array, slope: FloatArray) -> Float32Array:
-    """Return the derivative of rows with their number.
+def wide_rows(half_px: int) -> int:
+    """Return how many rows a window has with those beyond it."""
+    return 2 * (half_px + REACH) + 1
+
+
+def channels(columns: Float32Array, path_row: FloatArray, half_px: int, basis: Float32Array) -> Float32Array:
+    """Return channels of the window about a path: each a weighted sum of its rows, those beyond it included.
 
     Parameters
     ----------
-    rows : float32 array, shape (row, column)
+    columns, path_row, half_px
+        See `follow`.
+    basis : float32 array, shape (row, channel)
+
+    Returns
+    -------
+    float32 array, shape (column, channel)
+    """
+    window = _followed(columns, path_row, half_px)
+    padded = np.zeros((window.shape[1], basis.shape[1]), np.float32)
+    padded[: basis.shape[0]] = basis
+    # in small blocks, which no library spreads over threads of its own
+    blocks = np.matmul(window.reshape(-1, BLOCK, window.shape[1]), padded)
+    return np.asarray(blocks.reshape(-1, basis.shape[1])[: columns.shape[0]])
+
+
+BLOCK = 128
+
+
+def _followed(columns: Float32Array, path_row: FloatArray, half_px: int) -> Float32Array:
+    """A window with columns up to a multiple of `BLOCK`, those beyond the picture black, and rows up to one of `LANES`."""
+    rows = wide_rows(half_px)
+    width = columns.shape[0]
+    window = np.empty((-(-width // BLOCK) * BLOCK, -(-rows // LANES) * LANES), np.float32)
+    window[width:] = 0
+    _follow(columns, path_row, _TAPS, half_px + REACH, window[:width])
+    return window
+
+
+def shifted(rows: int, px: float) -> FloatArray:
+    """Return the matrix that takes rows to `rows` rows from their middle, each moved by less than one row.
+
+    Returns
+    -------
+    float64 array, shape (rows, rows + 10)
+        Of the interpolation that `follow` does.
+    """
+    whole = int(np.floor(px))
+    taps = interpolation_taps(np.array([px - whole]))[0]
+    matrix = np.zeros((rows, rows + TAPS))
+    for row in range(rows):
+        first = row + whole + TAPS // 2 - BEFORE
+        matrix[row, first : first + TAPS] = taps
+    return matrix
+
+
+def across(rows: int, slope: FloatArray) -> FloatArray:
+    """Return the matrix that takes rows to the derivative of the middle ones with their number.
+
+    Parameters
+    ----------
+    rows : int
+        How many derivatives are wanted.
     slope : float64 array
         `GENTLE` or `SHARP`.
 
     Returns
     -------
-    float32 array, shape (row − 14, column)
+    float64 array, shape (rows, rows + 2 taps)
     """
-    n = rows.shape[0]
-    out = np.zeros((n - 2 * REACH, rows.shape[1]), np.float32)
-    for k, tap in enumerate(slope.astype(np.float32), start=1):
-        out += tap * (rows[REACH + k : n - REACH + k] - rows[REACH - k : n - REACH - k])
-    return out
+    matrix = np.zeros((rows, rows + 2 * slope.size))
+    middle = np.arange(rows)
+    for k, tap in enumerate(slope, start=1):
+        matrix[middle, middle + slope.size + k] = tap
+        matrix[middle, middle + slope.size - k] = -tap
+    return matrix
 
 
 @numba.njit(cache=True, nogil=True)
-def _follow(columns, path_row, taps, window):  # type: ignore[no-untyped-def]
-    rows, width = window.shape
-    half = rows // 2
+def _follow(columns, path_row, taps, half, window):  # type: ignore[no-untyped-def]
+    width, rows = window.shape
     height = columns.shape[1]
-    stretch = np.empty(rows + taps.shape[1] - 1, np.float32)
-    value = np.empty(rows, np.float32)
+    reach = rows + taps.shape[1] - 1
+    edge = np.empty(reach, np.float32)
     for x in range(width):
         floor = int(np.floor(path_row[x]))
         phase = int((path_row[x] - floor) * (taps.shape[0] - 1) + 0.5)
         first = floor - half - (taps.shape[1] // 2 - 1)
-        if first >= 0 and first + stretch.size <= height:
-            stretch[:] = columns[x, first : first + stretch.size]
+        if first >= 0 and first + reach <= height:
+            _interpolate(columns[x, first : first + reach], taps[phase], window[x])
         else:
-            for j in range(stretch.size):
-                stretch[j] = columns[x, min(max(first + j, 0), height - 1)]
-        _interpolate(stretch, taps[phase], value)
-        for j in range(rows):
-            window[j, x] = value[j]
+            for j in range(reach):
+                edge[j] = columns[x, min(max(first + j, 0), height - 1)]
+            _interpolate(edge, taps[phase], window[x])
 
 
-@numba.njit(cache=True, nogil=True)
-def _interpolate(stretch, taps, value):  # type: ignore[no-untyped-def]
-    value[:] = np.float32(0)
-    for i in range(taps.size):
-        _add_scaled(taps[i], stretch[i : i + value.size], value)
-
-
-@numba.njit(cache=True, nogil=True)
-def _add_scaled(w, row, value):  # type: ignore[no-untyped-def]
-    for j in range(value.size):
-        value[j] += w * row[j]
+@numba.njit(cache=True, nogil=True, fastmath={"contract"})
+def _interpolate(column, w, value):  # type: ignore[no-untyped-def]
+    """Ten taps at once, so that every value is written once."""
+    n = value.size
+    x0, x1, x2, x3, x4 = column[:n], column[1 : n + 1], column[2 : n + 2], column[3 : n + 3], column[4 : n + 4]
+    x5, x6, x7, x8, x9 = column[5 : n + 5], column[6 : n + 6], column[7 : n + 7], column[8 : n + 8], column[9 : n + 9]
+    w0, w1, w2, w3, w4, w5, w6, w7, w8, w9 = w[0], w[1], w[2], w[3], w[4], w[5], w[6], w[7], w[8], w[9]
+    for j in range(n):
+        near = (w3 * x3[j] + w4 * x4[j]) + (w5 * x5[j] + w6 * x6[j])
+        far = (w0 * x0[j] + w1 * x1[j]) + (w2 * x2[j] + w7 * x7[j])
+        value[j] = near + far + (w8 * x8[j] + w9 * x9[j])

@@ -20,30 +20,29 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import fft
 
-from gramoscope.conventions import Float32Array, FloatArray, IntArray
+from gramoscope.conventions import BoolArray, FloatArray, IntArray
 from gramoscope.disc.formats import Cut
 from gramoscope.errors import require
 from gramoscope.pickup.cartridge import Spread
-from gramoscope.pickup.texture.following import GENTLE, SHARP
+from gramoscope.pickup.texture.filter_bank import (
+    FilterBank,
+    common_channels,
+    interpolated,
+    strongest_filters,
+    through_channels,
+    witness_forms,
+)
+from gramoscope.pickup.texture.following import REACH, SHARP, across, wide_rows
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.likelihood import (
     StripeStatistics,
     believable,
     best_shares,
     quiet_power,
+    said,
     softened,
 )
-from gramoscope.pickup.texture.reading import (
-    Model,
-    Rules,
-    Stretch,
-    both_sides,
-    clear_columns,
-    evidence,
-    step,
-    windows,
-    witnessed,
-)
+from gramoscope.pickup.texture.reading import Model, Rules, Stretch, clear_columns, evidence, step
 from gramoscope.pickup.texture.spectrum import Band, CrossSpectra, cross_spectra, precision, whitening_filter
 from gramoscope.pickup.texture.tone import Tone, mean_level
 
@@ -62,6 +61,29 @@ class Lesson:
 
     whole: Model
     without: tuple[Model, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Forms:
+    """What both witnesses say of a stripe, as quadratic forms of its window.
+
+    Attributes
+    ----------
+    witnesses : (float64 array, float64 array), shape (bin in the band, row, row)
+    spectra : float64 array, same shape
+        C_f of the window.
+    length : int
+        Of the transform whose bins these are.
+    """
+
+    witnesses: tuple[FloatArray, FloatArray]
+    spectra: FloatArray
+    length: int
+
+    def through(self, basis: FloatArray) -> Forms:
+        """Return what they say of channels, shape (row, channel)."""
+        (first, spectra), (second, _) = (through_channels(form, self.spectra, basis) for form in self.witnesses)
+        return Forms((first, second), spectra, self.length)
 
 
 @dataclass(frozen=True)
@@ -85,7 +107,9 @@ class Learning:
     least_columns : int
         A stripe seen in fewer columns is not read.
     spread_noises, spread_limit_px : float
-        Witnesses are heard so many standard errors of a path on either side of it, and so many pixels at the most.
+        Paths are heard so many of their standard errors on either side, and so many pixels at the most.
+    channels, filters : int
+        Of what is heard of a window, see `texture.filter_bank`; both even.
     folds : int
         Parts of the learning groups, each read by what the others taught; 2 or more.
     """
@@ -100,12 +124,18 @@ class Learning:
     least_columns: int = 6000
     spread_noises: float = 4.0
     spread_limit_px: float = 0.8
+    channels: int = 16
+    filters: int = 4
     folds: int = 4
 
     def __post_init__(self) -> None:
         require(self.half_px >= 4, f"windows of ± {self.half_px} rows", "4 or more")
         require(self.spread_noises >= 0, f"a spread of {self.spread_noises} standard errors", "0 or more")
-        require(0 <= self.spread_limit_px <= 2, f"a spread of up to {self.spread_limit_px} px", "0 … 2")
+        require(0 <= self.spread_limit_px < 1, f"a spread of up to {self.spread_limit_px} px", "0 … below 1")
+        most = wide_rows(self.half_px)
+        require(2 <= self.channels <= most, f"{self.channels} channels", f"2 … {most}, the rows of a window")
+        possible = 2 <= self.filters <= self.channels and self.filters % 2 == 0
+        require(possible, f"{self.filters} filters", "an even number of them, 2 or more, and no more than channels")
         require(self.folds >= 2, f"{self.folds} folds", "2 or more")
         require(len(self.loading) >= 1, "no rounds", "at least one loading")
         require(len(self.compressions) >= 1, "no tone", "at least one compression; 0 leaves pictures as they are")
@@ -196,12 +226,12 @@ class Learning:
             clear = clear_columns(stretch, number, row, visible[number], self.half_px, rules)
             if not clear.any():
                 continue
-            window, _ = windows(stretch, row, model)
+            window = model.window(stretch.in_tone(model.tone).columns, row)[:, REACH:-REACH]
             for start in range(0, clear.size - 256, 128):
                 piece = slice(start, start + 256)
                 if clear[piece].all():
-                    level = window[:, piece] - window[:, piece].mean(axis=1, keepdims=True)
-                    spectra.append(np.mean(np.abs(np.fft.rfft(level * taper, axis=1)) ** 2, axis=0))
+                    level = window[piece] - window[piece].mean(axis=0)
+                    spectra.append(np.mean(np.abs(np.fft.rfft(level * taper[:, None], axis=0)) ** 2, axis=1))
         return np.median(spectra, axis=0) if spectra else None
 
     def _lesson(
@@ -240,85 +270,103 @@ class Learning:
         spread: Spread,
     ) -> list[StripeStatistics | None]:
         """Return what is known of a stripe without each fold, and from all of them."""
-        sums = list(spread(lambda s: self._sums(s, blank, number, before, rules), stretches))
-        parts = [
-            [one for one, k in zip(sums, fold, strict=True) if one is not None and k != left]
-            for left in range(self.folds)
-        ]
-        parts.append([one for one in sums if one is not None])
-        if min(sum(size for _, _, size in part) for part in parts) < self.least_columns:
+        totals = [CrossSpectra(wide_rows(self.half_px), blank.length) for _ in range(self.folds)]
+        for one, k in zip(spread(lambda s: self._sums(s, blank, number, before, rules), stretches), fold, strict=True):
+            if one is not None:
+                totals[k].add(one)
+        parts = [self._together(totals, left) for left in (*range(self.folds), None)]
+        if min(part.columns for part in parts) < self.least_columns:
             return [None] * len(parts)
-        first = [self._statistics(part, blank, loading) for part in parts]
-        mean, answers, powers = self._tried(stretches, fold, blank, number, first, rules, spread)
+        known = list(spread(lambda part: self._forms(part, blank, loading), parts))
+        whole, everything = parts[-1], known[-1]
+        basis = common_channels(everything.witnesses, everything.spectra, self.channels)
+        blind = [
+            StripeStatistics(
+                FilterBank(basis.astype(np.float32), np.empty((0, 0, 0), np.float32), np.empty(0, np.float32)),
+                information=1.0,
+                score_power=1.0,
+                mean_score=0.0,
+                row_power=np.diag(part.covariance),
+                channel_power=np.diag(basis.T @ whole.covariance @ basis),
+                columns=part.columns,
+            )
+            for part in parts
+        ]
+        seen = [one.through(basis) for one in known]
+        alone = [[self._bank(form, one.spectra, basis, blank) for form in one.witnesses] for one in seen]
+        _, answers, powers = self._tried(
+            stretches, fold, blank, number, blind, [[bank for bank, _ in one] for one in alone], rules, spread
+        )
         share = best_shares(answers, powers)
+        both = []
+        for one, banks in zip(seen, alone, strict=True):
+            weights = [s / loudness for s, (_, loudness) in zip(share, banks, strict=True)]
+            mixed = weights[0] * one.witnesses[0] + weights[1] * one.witnesses[1]
+            both.append([self._bank(mixed, one.spectra, basis, blank)[0]])
+        mean, answers, powers = self._tried(stretches, fold, blank, number, blind, both, rules, spread)
         return [
             replace(
                 one,
-                share=share,
-                mean_score=float(share @ mean),
-                information=max(float(share @ answers), 1e-6),
-                score_power=float(share @ powers @ share),
+                bank=bank,
+                mean_score=float(mean[0]),
+                information=max(float(answers[0]), 1e-6),
+                score_power=float(powers[0, 0]),
             )
-            for one in first
+            for one, (bank,) in zip(blind, both, strict=True)
         ]
 
-    def _statistics(
-        self, sums: list[tuple[CrossSpectra, FloatArray, float]], blank: Model, loading: float
-    ) -> StripeStatistics:
-        columns = sum(size for _, _, size in sums)
-        total = CrossSpectra(2 * self.half_px + 1, blank.length)
-        for one, _, _ in sums:
-            total.add(one)
-        bins = blank.band.bins(blank.length)
-        c, change = total.spectra(
-            largest_lag_px=self.largest_lag_px, change_lag_px=self.change_lag_px, length=blank.length
-        )
-        inverse, noise = precision(c, band=bins, loading=loading)
-        row_power = np.sum([power for _, power, _ in sums], axis=0) / columns
-        return StripeStatistics(
-            inverse,
-            change[bins].astype(np.float32),
-            noise,
-            np.array([1.0, 0.0]),
-            1.0,
-            1.0,
-            0.0,
-            row_power.astype(np.float32),
-            int(columns),
-        )
+    def _together(self, totals: list[CrossSpectra], left: int | None) -> CrossSpectra:
+        """Sums of all folds but one."""
+        total = CrossSpectra(totals[0].rows, totals[0].length)
+        for k, one in enumerate(totals):
+            if k != left:
+                total.add(one)
+        return total
+
+    def _forms(self, total: CrossSpectra, blank: Model, loading: float) -> Forms:
+        """What spectra say about paths, in the bins that they can tell apart."""
+        length = self._coarse_length
+        bins = blank.band.bins(length)
+        c = total.spectra(largest_lag_px=self.largest_lag_px, length=length)
+        near = total.spectra(largest_lag_px=self.change_lag_px, length=length)[bins]
+        inner = slice(REACH, -REACH)
+        moved = np.pad(across(2 * self.half_px + 1, SHARP), ((0, 0), (REACH - SHARP.size,) * 2)) @ near[:, :, inner]
+        inverse, noise = precision(c[:, inner, inner], band=bins, loading=loading, smooth_bins=SMOOTH_CYCLES * length)
+        forms = witness_forms(inverse, moved + moved.transpose(0, 2, 1), noise, spread_px=blank.spread_px)
+        return Forms(forms, c[bins], self._coarse_length)
+
+    @property
+    def _coarse_length(self) -> int:
+        """Of a transform whose bins spectra cut off at the largest lag can just tell apart."""
+        return int(fft.next_fast_len(2 * self.largest_lag_px + 2, real=True))
+
+    def _bank(self, form: FloatArray, spectra: FloatArray, basis: FloatArray, blank: Model) -> tuple[FilterBank, float]:
+        """The strongest filters of a form, in the bins of the model, of loudness 1, and how loud they were."""
+        filters, sign = strongest_filters(form, spectra, self.filters)
+        length = self._coarse_length
+        loudness = max(2 / length * float(np.einsum("fkc,fcd,fkd->", filters, spectra, filters, optimize=True)), 1e-30)
+        fine, coarse = (np.arange(n // 2 + 1)[blank.band.bins(n)] / n for n in (blank.length, length))
+        filters = interpolated(filters / np.sqrt(loudness), coarse, fine)
+        return FilterBank(basis.astype(np.float32), filters.astype(np.float32), sign.astype(np.float32)), loudness
 
     def _sums(
         self, stretch: Stretch, model: Model, number: int, before: StripeStatistics | None, rules: Rules
-    ) -> tuple[CrossSpectra, FloatArray, float] | None:
-        laid = self._laid(stretch, model, number, before, rules, slope=SHARP)
-        if laid is None:
-            return None
-        window, derivative, weight = laid
-        spectra = cross_spectra(window, derivative, weight, length=model.length)
-        return spectra, (window**2 * weight).sum(axis=1).astype(np.float64), float(weight.sum())
-
-    def _laid(
-        self,
-        stretch: Stretch,
-        model: Model,
-        number: int,
-        before: StripeStatistics | None,
-        rules: Rules,
-        *,
-        slope: FloatArray = GENTLE,
-    ) -> tuple[Float32Array, Float32Array, Float32Array] | None:
-        """Return window, derivative and weight of a stripe; None where too little of it can be seen."""
-        rows = model.layout.rows(stretch.displacement_px)
-        row = rows[number]
-        seen = model.layout.visible(rows, half_px=self.half_px)[number]
-        clear = clear_columns(stretch, number, row, seen, self.half_px, rules)
+    ) -> CrossSpectra | None:
+        """Cross-spectra of a stripe; None where too little of it can be seen."""
+        row, clear = self._clear(stretch, model, number, rules)
         if not clear.any():
             return None
-        window, derivative = windows(stretch, row, model, slope=slope)
-        usual = before.row_power if before is not None else np.median(window**2, axis=1) / 0.455
-        clear &= believable(window, usual, limits=rules.power_limits)
-        weight = softened(clear)
-        return (window, derivative, weight) if weight.sum() > 100 else None
+        window = model.window(stretch.in_tone(model.tone).columns, row)
+        inner = window[:, REACH:-REACH]
+        usual = before.row_power[REACH:-REACH] if before is not None else np.median(inner**2, axis=0) / 0.455
+        weight = softened(clear & believable(inner, usual, limits=rules.power_limits))
+        return cross_spectra(window, weight, length=model.length) if weight.sum() > 100 else None
+
+    def _clear(self, stretch: Stretch, model: Model, number: int, rules: Rules) -> tuple[FloatArray, BoolArray]:
+        """Where a stripe runs, and in which columns it can be seen."""
+        rows = model.layout.rows(stretch.displacement_px)
+        seen = model.layout.visible(rows, half_px=self.half_px)[number]
+        return rows[number], clear_columns(stretch, number, rows[number], seen, self.half_px, rules)
 
     def _tried(
         self,
@@ -327,31 +375,34 @@ class Learning:
         blank: Model,
         number: int,
         learned: list[StripeStatistics],
+        banks: list[list[FilterBank]],
         rules: Rules,
         spread: Spread,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Measure the mean of what a stripe's witnesses say, how they answer to a moved path, and their powers."""
+        """Measure the means of what banks say of a stripe, how they answer to a moved path, and their powers."""
 
         def tried(pair: tuple[Stretch, int]) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-            stretch, statistics = pair[0], learned[pair[1]]
-            laid = self._laid(stretch, blank, number, statistics, rules)
-            if laid is None:
+            stretch, left = pair
+            row, clear = self._clear(stretch, blank, number, rules)
+            if not clear.any():
                 return None
-            _, _, weight = laid
-            row = blank.layout.rows(stretch.displacement_px)[number]
-            u, low, high = (
-                witnessed(both_sides(stretch, row + move, blank), weight, blank, statistics)
-                for move in (0.0, -MOVE_PX, MOVE_PX)
+            columns = stretch.in_tone(blank.tone).columns
+            here, low, high = (blank.channels(columns, row + move, banks[left][0]) for move in (0.0, -MOVE_PX, MOVE_PX))
+            weight = softened(clear & believable(here, learned[left].channel_power, limits=rules.power_limits))
+            if weight.sum() <= 100:
+                return None
+            u, below, above = (
+                np.array([said(z, weight, bank, band=blank.band, length=blank.length) for bank in banks[left]])
+                for z in (here, low, high)
             )
-            answer = (low - high) @ weight / (2 * MOVE_PX)
-            return u, weight.astype(np.float64), answer
+            return u, weight.astype(np.float64), (below - above) @ weight / (2 * MOVE_PX)
 
         told = [one for one in spread(tried, zip(stretches, fold, strict=True)) if one is not None]
         columns = max(sum(float(w.sum()) for _, w, _ in told), 1.0)
-        mean = np.sum([u @ w for u, w, _ in told], axis=0) / columns
+        mean = sum((u @ w for u, w, _ in told), np.zeros(len(banks[0]))) / columns
         quiet = [quiet_power(u - mean[:, np.newaxis], w) for u, w, _ in told]
-        powers = np.sum([power for power, _ in quiet], axis=0) / max(sum(size for _, size in quiet), 1e-12)
-        answers = np.sum([answer for _, _, answer in told], axis=0) / columns
+        powers = sum((power for power, _ in quiet), np.zeros((mean.size,) * 2)) / max(sum(s for _, s in quiet), 1e-12)
+        answers = sum((answer for _, _, answer in told), np.zeros(mean.size)) / columns
         return mean, answers, powers
 
 
@@ -362,3 +413,5 @@ def _seen_in(model: Model, stretches: list[Stretch], spread: Spread) -> list[Str
 
 MOVE_PX = 0.1
 """By which paths are moved to see how scores answer."""
+SMOOTH_CYCLES = 0.011
+"""Cycles a pixel over which what is known of the noise is smoothed."""

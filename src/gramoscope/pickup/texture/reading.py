@@ -1,10 +1,10 @@
 """One stretch read by what the passage taught: where its walls run, column by column, and how surely.
 
-The path is improved in a few rounds of Fisher scoring. Each round lays windows on both sides of the present path of every
-stripe that can be seen, takes their scores, weights them by how far they can be trusted, and moves the walls by the smoothed
-ratio of score and information. On both sides, because a path settles where its score is zero: there the score's noise looks
-like an answer, and a little further off it has been forgotten. Rounds go from forgiving models to exact ones, the very models
-that were learned while the passage's own paths improved in the same way.
+The path is improved in a few rounds of Fisher scoring. Each round lays a window about the present path of every stripe that
+can be seen, hears both sides of the path in it, weights what they say by how far it can be trusted, and moves the walls by the
+smoothed ratio of score and information. Both sides, because a path settles where its score is zero: there the score's noise
+looks like an answer, and a little further off it has been forgotten. Rounds go from forgiving models to exact ones, the very
+models that were learned while the passage's own paths improved in the same way.
 """
 
 from __future__ import annotations
@@ -18,9 +18,10 @@ from scipy import fft, ndimage
 
 from gramoscope.conventions import INNER, OUTER, BoolArray, Float32Array, FloatArray
 from gramoscope.disc.formats import Cut
-from gramoscope.pickup.texture.following import GENTLE, REACH, across, follow
+from gramoscope.pickup.texture.filter_bank import FilterBank
+from gramoscope.pickup.texture.following import channels, follow
 from gramoscope.pickup.texture.layout import StripeLayout
-from gramoscope.pickup.texture.likelihood import StripeStatistics, believable, quiet_power, softened, witnesses
+from gramoscope.pickup.texture.likelihood import StripeStatistics, believable, quiet_power, said, softened
 from gramoscope.pickup.texture.spectrum import Band, filtered
 from gramoscope.pickup.texture.tone import Tone
 
@@ -86,7 +87,7 @@ class Model:
     stripes : tuple of StripeStatistics or None
         None for a stripe of which too little was seen.
     spread_px : float
-        How far on either side of a path its witnesses are heard.
+        How far on either side of a path it is heard.
     """
 
     layout: StripeLayout
@@ -97,6 +98,14 @@ class Model:
     length: int
     stripes: tuple[StripeStatistics | None, ...]
     spread_px: float = 0.0
+
+    def window(self, columns: Float32Array, stripe_row: FloatArray) -> Float32Array:
+        """Return the whitened window about a path and the rows beyond it, shape (column, row)."""
+        return filtered(follow(columns, stripe_row, self.half_px), self.whitener)
+
+    def channels(self, columns: Float32Array, stripe_row: FloatArray, bank: FilterBank) -> Float32Array:
+        """Return the channels of the whitened window about a path, shape (column, channel)."""
+        return filtered(channels(columns, stripe_row, self.half_px, bank.basis), self.whitener)
 
     def path_noise_px(self, smooth_px: float) -> float:
         """Return the standard error that a path would have if errors were as claimed, smoothed by a Gaussian."""
@@ -156,14 +165,6 @@ class Rules:
     largest_step_px: float = 1.0
 
 
-def windows(
-    stretch: Stretch, stripe_row: FloatArray, model: Model, *, slope: FloatArray = GENTLE
-) -> tuple[Float32Array, Float32Array]:
-    """Return the whitened window about a path, in the model's tone, and its derivative, shape (row, column)."""
-    wide = filtered(follow(stretch.in_tone(model.tone).columns, stripe_row, model.half_px), model.whitener)
-    return np.ascontiguousarray(wide[REACH:-REACH]), across(wide, slope)
-
-
 def clear_columns(
     stretch: Stretch, number: int, stripe_row: FloatArray, visible: BoolArray, half_px: int, rules: Rules
 ) -> BoolArray:
@@ -190,44 +191,25 @@ def evidence(stretch: Stretch, model: Model, rules: Rules) -> Evidence:
     score, information, surprise = np.zeros((2, width)), np.zeros((2, width)), np.zeros((2, 2))
     rows = model.layout.rows(stretch.displacement_px)
     visible = model.layout.visible(rows, half_px=model.half_px)
+    seen = stretch.in_tone(model.tone)
     for number, statistics in enumerate(model.stripes):
         if statistics is None:
             continue
-        row, wall = rows[number], model.layout.wall[number]
-        clear = clear_columns(stretch, number, row, visible[number], model.half_px, rules)
+        wall = model.layout.wall[number]
+        clear = clear_columns(stretch, number, rows[number], visible[number], model.half_px, rules)
         if not clear.any():
             continue
-        heard = both_sides(stretch, row, model)
-        for window, _ in heard:
-            clear &= believable(window, statistics.row_power, limits=rules.power_limits)
-        weight = softened(clear)
-        u = statistics.share @ witnessed(heard, weight, model, statistics)
-        weight64 = weight.astype(np.float64)
+        heard = model.channels(seen.columns, rows[number], statistics.bank)
+        weight = softened(clear & believable(heard, statistics.channel_power, limits=rules.power_limits))
+        u = said(heard, weight, statistics.bank, band=model.band, length=model.length)
         u = (u - statistics.mean_score) * statistics.trust
+        weight64 = weight.astype(np.float64)
         score[wall] += weight64 * u
         information[wall] += weight64 * statistics.trust * statistics.information
         power, columns = quiet_power(u[np.newaxis], weight64)
         surprise[wall] += power[0, 0], columns * statistics.trust**2 * statistics.score_power
     with np.errstate(invalid="ignore", divide="ignore"):
         return Evidence(score, information, surprise[:, 0] / surprise[:, 1])
-
-
-Sides = list[tuple[Float32Array, Float32Array]]
-
-
-def both_sides(stretch: Stretch, stripe_row: FloatArray, model: Model) -> Sides:
-    """Return windows and derivatives on either side of a path, or about the path itself where the model has no spread."""
-    sides = (-model.spread_px, model.spread_px) if model.spread_px else (0.0,)
-    return [windows(stretch, stripe_row + side, model) for side in sides]
-
-
-def witnessed(heard: Sides, weight: Float32Array, model: Model, statistics: StripeStatistics) -> FloatArray:
-    """Return what both witnesses say of a path, the mean of what they say on either side of it, shape (2, column)."""
-    said = [
-        witnesses(window, derivative, weight, statistics, band=model.band, length=model.length)
-        for window, derivative in heard
-    ]
-    return np.asarray(np.mean(said, axis=0))
 
 
 def step(found: Evidence, cut: Cut, rules: Rules) -> FloatArray:

@@ -19,10 +19,10 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-import numpy.typing as npt
-from scipy import fft, signal
+from scipy import fft, ndimage, signal
 
 from gramoscope.conventions import Float32Array, FloatArray
+from gramoscope.errors import require
 
 WHITENER_TAPS = 41
 
@@ -71,28 +71,51 @@ def whitening_filter(power: FloatArray, band: Band) -> FloatArray:
 
 
 @numba.njit(cache=True, nogil=True, fastmath={"contract"})
-def _add_pair(w, before, after, out):  # type: ignore[no-untyped-def]
-    for x in range(out.size):
-        out[x] += w * (before[x] + after[x])
+def _add_pairs(w, here, nearer, out):  # type: ignore[no-untyped-def]
+    """Two pairs of taps at once; `here` and `nearer` are what lies before and behind."""
+    w0, w1 = w
+    before, behind = here
+    before_, behind_ = nearer
+    for i in range(out.size):
+        out[i] += w0 * (before[i] + behind[i]) + w1 * (before_[i] + behind_[i])
+
+
+@numba.njit(cache=True, nogil=True, fastmath={"contract"})
+def _scale(w, values, out):  # type: ignore[no-untyped-def]
+    for i in range(out.size):
+        out[i] = w * values[i]
 
 
 @numba.njit(cache=True, nogil=True)
 def _filter(rows, half_taps, out):  # type: ignore[no-untyped-def]
-    """Filter each row by taps given from their middle on."""
-    height, width = rows.shape
+    """Filter along the columns by taps given from their middle on, an even number beyond it."""
+    width, n = rows.shape
     half = half_taps.size - 1
-    wide = np.empty(width + 2 * half, np.float32)
-    for i in range(height):
-        wide[half : half + width] = rows[i]
-        for k in range(half):
-            # a row that is shorter than the mirror repeats its other end
-            mirrored = min(k, width - 1)
-            wide[half - 1 - k] = rows[i, mirrored]
-            wide[half + width + k] = rows[i, width - 1 - mirrored]
-        here = wide[half : half + width]
-        _add_pair(np.float32(0.5) * half_taps[0], here, here, out[i])
-        for k in range(1, half + 1):
-            _add_pair(half_taps[k], wide[half - k : half - k + width], wide[half + k : half + k + width], out[i])
+    wide = np.empty((width + 2 * half, n), np.float32)
+    wide[half : half + width] = rows
+    for k in range(half):
+        # a window that is shorter than the mirror repeats its other end
+        mirrored = min(k, width - 1)
+        wide[half - 1 - k] = rows[mirrored]
+        wide[half + width + k] = rows[width - 1 - mirrored]
+    flat, into = wide.ravel(), out.ravel()
+    block = max(1, FILTER_BLOCK // n) * n
+    for start in range(0, into.size, block):
+        stop = min(start + block, into.size)
+        piece = into[start:stop]
+        _scale(half_taps[0], flat[start + half * n : stop + half * n], piece)
+        for k in range(1, half, 2):
+            a, b, c, d = (half - k) * n, (half + k) * n, (half - k - 1) * n, (half + k + 1) * n
+            _add_pairs(
+                (half_taps[k], half_taps[k + 1]),
+                (flat[start + a : stop + a], flat[start + b : stop + b]),
+                (flat[start + c : stop + c], flat[start + d : stop + d]),
+                piece,
+            )
+
+
+FILTER_BLOCK = 1024
+"""Values that are filtered at a time, and stay near."""
 
 
 def filtered(rows: Float32Array, taps: FloatArray) -> Float32Array:
@@ -100,12 +123,15 @@ def filtered(rows: Float32Array, taps: FloatArray) -> Float32Array:
 
     Parameters
     ----------
-    rows : float32 array, shape (row, column)
+    rows : float32 array, shape (column, row)
     taps : float64 array
         An odd number of them.
     """
-    out = np.zeros(rows.shape, np.float32)
-    _filter(rows, taps[taps.size // 2 :].astype(np.float32), out)
+    half_taps = taps[taps.size // 2 :].astype(np.float32)
+    if half_taps.size % 2 == 0:
+        half_taps = np.append(half_taps, np.float32(0))
+    out = np.empty(rows.shape, np.float32)
+    _filter(rows, half_taps, out)
     return out
 
 
@@ -126,73 +152,73 @@ class CrossSpectra:
     def __post_init__(self) -> None:
         bins = self.length // 2 + 1
         self.within: FloatArray = np.zeros((bins, self.rows, self.rows))
-        self.change: FloatArray = np.zeros((bins, self.rows, self.rows))
         self.weight: FloatArray = np.zeros(bins)
 
     def add(self, other: CrossSpectra) -> None:
         """Add the sums of other windows."""
         self.within += other.within
-        self.change += other.change
         self.weight += other.weight
 
-    def spectra(self, *, largest_lag_px: int, change_lag_px: int, length: int) -> tuple[FloatArray, FloatArray]:
-        """Return C_f and C′_f.
+    @property
+    def columns(self) -> float:
+        """How many columns were summed over, each counted by the square of its weight."""
+        return float(fft.irfft(self.weight, self.length)[0])
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Of the rows in one column, shape (row, row)."""
+        return np.asarray(fft.irfft(self.within, self.length, axis=0)[0] / max(self.columns, 1.0))
+
+    def spectra(self, *, largest_lag_px: int, length: int) -> FloatArray:
+        """Return C_f.
 
         Parameters
         ----------
-        largest_lag_px, change_lag_px : int
-            For C and for C′: the lag window is 1 to half of it and falls to zero as a cosine.
+        largest_lag_px : int
+            The lag window is 1 to half of it and falls to zero as a cosine.
         length : int
-            Of the transform in whose bins the answer is wanted.
+            Of the transform in whose bins the answer is wanted, more than twice the largest lag.
 
         Returns
         -------
-        C, change : float64 arrays, shape (length // 2 + 1, row, row)
+        float64 array, shape (length // 2 + 1, row, row)
         """
+        require(
+            length > 2 * largest_lag_px,
+            f"a transform of {length} for lags up to {largest_lag_px}",
+            "more than twice it",
+        )
+        u = np.arange(largest_lag_px + 1) / (largest_lag_px + 1)
+        taper = np.where(u < 0.5, 1.0, 0.5 * (1 + np.cos(2 * np.pi * (u - 0.5))))
+        columns = np.maximum(fft.irfft(self.weight, self.length)[: u.size], 1.0)
+        covariance = fft.irfft(self.within, self.length, axis=0)[: u.size] * (taper / columns)[:, None, None]
+        full = np.zeros((length, self.rows, self.rows))
+        full[: u.size] = covariance
+        full[-u.size + 1 :] = covariance[1:][::-1]
+        return np.asarray(fft.rfft(full, axis=0).real)
 
-        def smoothed(sums: FloatArray, lag_px: int) -> FloatArray:
-            u = np.arange(lag_px + 1) / (lag_px + 1)
-            taper = np.where(u < 0.5, 1.0, 0.5 * (1 + np.cos(2 * np.pi * (u - 0.5))))
-            columns = np.maximum(fft.irfft(self.weight, self.length)[: u.size], 1.0)
-            covariance = fft.irfft(sums, self.length, axis=0)[: u.size] * (taper / columns)[:, None, None]
-            full = np.zeros((length, self.rows, self.rows))
-            full[: u.size] = covariance
-            full[-u.size + 1 :] = covariance[1:][::-1]
-            return np.asarray(fft.rfft(full, axis=0).real)
 
-        return smoothed(self.within, largest_lag_px), smoothed(self.change, change_lag_px)
-
-
-def cross_spectra(window: Float32Array, derivative: Float32Array, weight: Float32Array, *, length: int) -> CrossSpectra:
+def cross_spectra(window: Float32Array, weight: Float32Array, *, length: int) -> CrossSpectra:
     """Return the cross-spectra of one window, zero where its columns have no weight.
 
     Parameters
     ----------
-    window, derivative : float32 arrays, shape (row, column)
+    window : float32 array, shape (column, row)
         Whitened.
     weight : float32 array, shape (column,)
         0 … 1, rising and falling softly.
     length : int
         Of the transforms.
     """
-    out = CrossSpectra(window.shape[0], length)
-    seen, moved = (_parts(fft.rfft(rows * weight, length)) for rows in (window, derivative))
+    out = CrossSpectra(window.shape[1], length)
+    x = fft.rfft(window * weight[:, None], length, axis=0)
+    seen = np.stack([x.real, x.imag], axis=2)
     out.within += seen @ seen.transpose(0, 2, 1)
-    half = moved @ seen.transpose(0, 2, 1)
-    out.change += half + half.transpose(0, 2, 1)
     out.weight += np.abs(fft.rfft(weight.astype(np.float64), length)) ** 2
     return out
 
 
-def _parts(spectrum: npt.NDArray[np.complex64]) -> Float32Array:
-    """Return real and imaginary parts, shape (bin, row, 2)."""
-    x = np.ascontiguousarray(spectrum.T)
-    return np.stack([x.real, x.imag], axis=2)
-
-
-def precision(
-    c: FloatArray, *, band: slice, loading: float, smooth_bins: float = 16.0
-) -> tuple[Float32Array, Float32Array]:
+def precision(c: FloatArray, *, band: slice, loading: float, smooth_bins: float) -> tuple[FloatArray, FloatArray]:
     """Return the inverse of C_f in a band, safe against what the sample could not tell.
 
     The least third of the eigenvalues of each C_f is noise; none is allowed below their mean (smoothed along f), and
@@ -210,14 +236,14 @@ def precision(
 
     Returns
     -------
-    float32 array, shape (bin in the band, row, row)
+    inverse : float64 array, shape (bin in the band, row, row)
+    noise : float64 array, shape (bin in the band,)
+        What the least eigenvalues have.
     """
-    from scipy.ndimage import gaussian_filter1d
-
     value, vector = np.linalg.eigh(c[band])
     rows = c.shape[1]
     least = np.maximum(value[:, : rows // 3].mean(axis=1), 1e-12 * value[:, -1])
-    floor = gaussian_filter1d(least, smooth_bins, mode="nearest")
+    floor = ndimage.gaussian_filter1d(least, smooth_bins, mode="nearest")
     value = np.maximum(value, floor[:, None]) + loading * np.trace(c[band], axis1=1, axis2=2)[:, None] / rows
     inverse = (vector / value[:, None, :]) @ vector.transpose(0, 2, 1)
-    return inverse.astype(np.float32), floor.astype(np.float32)
+    return inverse, floor

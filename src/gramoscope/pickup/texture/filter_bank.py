@@ -1,0 +1,215 @@
+"""A few filters whose energies tell which way a path should move.
+
+What a witness (see `likelihood`) says of a path is a quadratic form of the window about it, xᴴ Q_f x at every frequency f. Most
+of such a form is in a few of its eigenvectors: seen through them the window is loud in some when the path lies too low, and
+in the others when it lies too high,
+
+    u(s) = Σ_k ± p_k(s)²,     p_k = U_k x,
+
+and four of them know as much as all forty-one: what the rest would add is mostly what the passage could not tell well enough
+(docs/decisions/0008). Two more things make them quick. All filters are mixtures of the same few *channels* of the window, so
+that only these are drawn, whitened and transformed. And hearing both sides of a path, which is the mean of the same form about
+two paths beside each other, is one form of a slightly wider window.
+
+The filters of neighbouring frequencies are turned into each other as far as their energies allow (Procrustes), so that the
+products of different frequencies, of which everything that changes along the groove consists, are right too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from scipy import fft
+
+from gramoscope.conventions import Float32Array, FloatArray
+from gramoscope.pickup.texture.following import GENTLE, across, shifted
+from gramoscope.pickup.texture.spectrum import Band
+
+LEAST_POWER = 1e-6
+"""Of the loudest direction: what is weaker in a covariance is taken to be that strong."""
+
+
+@dataclass(frozen=True, eq=False)
+class FilterBank:
+    """What turns a window into the energies that a score is made of.
+
+    Attributes
+    ----------
+    basis : float32 array, shape (row, channel)
+        The channels: uncorrelated and of power 1 in the passage that was learned from.
+    filters : float32 array, shape (bin in the band, filter, channel)
+    sign : float32 array, shape (filter,)
+        Whether more energy asks for a path with a higher row number, +1, or a lower one, −1.
+    """
+
+    basis: Float32Array
+    filters: Float32Array
+    sign: Float32Array
+
+    def heard(self, channels: Float32Array, *, band: Band, length: int) -> tuple[Float32Array, Float32Array]:
+        """Return Σ ± p² and Σ p² in each column.
+
+        Parameters
+        ----------
+        channels : float32 array, shape (column, channel)
+            Whitened, zero where nothing is to be heard.
+        band : Band
+        length : int
+            Of the transform, at least the number of columns.
+        """
+        spectrum = fft.rfft(channels, length, axis=0)
+        through = np.zeros((self.sign.size, spectrum.shape[0]), np.complex64)
+        _through(spectrum[band.bins(length)], self.filters, through[:, band.bins(length)])
+        p = fft.irfft(through, length)
+        score, loudness = np.empty((2, channels.shape[0]), np.float32)
+        _energies(p, self.sign, score, loudness)
+        return score, loudness
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _through(spectrum, filters, through):  # type: ignore[no-untyped-def]
+    bins, count, channels = filters.shape
+    for b in range(bins):
+        for k in range(count):
+            real, imaginary = np.float32(0), np.float32(0)
+            for c in range(channels):
+                real += filters[b, k, c] * spectrum[b, c].real
+                imaginary += filters[b, k, c] * spectrum[b, c].imag
+            through[k, b] = complex(real, imaginary)
+
+
+@numba.njit(cache=True, nogil=True)
+def _energies(p, sign, score, loudness):  # type: ignore[no-untyped-def]
+    score[:], loudness[:] = np.float32(0), np.float32(0)
+    for k in range(sign.size):
+        row, s = p[k, : score.size], sign[k]
+        for x in range(score.size):
+            energy = row[x] * row[x]
+            score[x] += s * energy
+            loudness[x] += energy
+
+
+def witness_forms(
+    inverse: FloatArray, change: FloatArray, noise: FloatArray, *, spread_px: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return Q_f of both witnesses: −(x' − (N C⁻¹x)')ᵀ C⁻¹x and −½ xᵀ C⁻¹ C′ C⁻¹ x, each the mean of both sides of a path.
+
+    Parameters
+    ----------
+    inverse, change : float64 arrays, shape (bin, row, row)
+        C⁻¹ and C′.
+    noise : float64 array, shape (bin,)
+        N.
+    spread_px : float
+        How far on either side of the path the window is heard, less than 1.
+
+    Returns
+    -------
+    float64 arrays, shape (bin, row + 16, row + 16)
+        Symmetric, of the window and eight rows more on each side.
+    """
+    rows = inverse.shape[1]
+    near = GENTLE.size
+    derivative = across(rows, GENTLE)
+    window = np.eye(rows, rows + 2 * near, near)
+    # what is explained by noise is known in the window only; beyond it counts as nothing
+    still = noise[:, None, None] * (derivative[:, near:-near] @ inverse @ window)
+    answers = (-(derivative - still).transpose(0, 2, 1), -0.5 * (window.T @ inverse @ change))
+    sides = [shifted(rows + 2 * near, side) for side in (-spread_px, spread_px)]
+    forms = []
+    for answer in answers:
+        form = answer @ (inverse @ window)
+        form = 0.5 * (form + form.transpose(0, 2, 1))
+        forms.append(0.5 * sum(side.T @ form @ side for side in sides))
+    return np.asarray(forms[0]), np.asarray(forms[1])
+
+
+def root(covariance: FloatArray) -> FloatArray:
+    """Return L with L Lᵀ the covariance (of each bin), what is next to nothing in it lifted a little; by eigenvectors."""
+    power, vector = np.linalg.eigh(covariance)
+    safe = np.maximum(power, LEAST_POWER * np.maximum(power[..., -1:], 1e-30))
+    return np.asarray(vector * np.sqrt(safe)[..., None, :])
+
+
+def common_channels(forms: tuple[FloatArray, ...], spectra: FloatArray, count: int) -> FloatArray:
+    """Return the channels of a window in which quadratic forms are best kept.
+
+    Parameters
+    ----------
+    forms : tuple of float64 arrays, shape (bin, row, row)
+        Each counts as much as the others.
+    spectra : float64 array, shape (bin, row, row)
+        C_f.
+    count : int
+
+    Returns
+    -------
+    float64 array, shape (row, channel)
+        Uncorrelated and of power 1 in the mean over the bins.
+    """
+    mean = root(spectra.mean(axis=0))
+    total = np.zeros(mean.shape)
+    for form in forms:
+        # E[(Qx)(Qx)ᵀ]: in which directions a form looks, by how much it says
+        looked = mean.T @ form @ spectra @ form @ mean
+        said = np.einsum("fij,fjk,fkl,fli->f", form, spectra, form, spectra, optimize=True)
+        total += (looked / np.maximum(np.mean(said), 1e-30)).sum(axis=0)
+    _, vector = np.linalg.eigh(total)
+    return np.asarray(np.linalg.solve(mean.T, vector[:, : -count - 1 : -1]))
+
+
+def through_channels(form: FloatArray, spectra: FloatArray, basis: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a form and the spectra as they are seen through channels.
+
+    What a form says of rows is said of what the channels lead to expect of the rows, R z with R = C B (BᵀC B)⁻¹.
+
+    Returns
+    -------
+    float64 arrays, shape (bin, channel, channel)
+    """
+    seen = basis.T @ spectra @ basis
+    expected = np.linalg.solve(seen, (spectra @ basis).transpose(0, 2, 1)).transpose(0, 2, 1)
+    return np.asarray(expected.transpose(0, 2, 1) @ form @ expected), np.asarray(seen)
+
+
+def strongest_filters(form: FloatArray, spectra: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
+    """Return the filters whose energies make up most of a form.
+
+    Parameters
+    ----------
+    form, spectra : float64 arrays, shape (bin, channel, channel)
+        Q_f and C_f.
+    count : int
+        Even: half of the filters have positive energies, half negative ones.
+
+    Returns
+    -------
+    filters : float64 array, shape (bin, filter, channel)
+        Σ_k sign_k (U_k x)² ≈ xᵀ Q x.
+    sign : float64 array, shape (filter,)
+    """
+    half = count // 2
+    lower = root(spectra)
+    strength, vector = np.linalg.eigh(lower.transpose(0, 2, 1) @ form @ lower)
+    used = np.r_[0:half, -half:0]
+    strength, vector = strength[:, used], vector[:, :, used]
+    sign = np.repeat([-1.0, 1.0], half)
+    # √|μ| L⁻ᵀ w = Q L w sign / √|μ|, without an inverse; an eigenvalue of the other sign says nothing here
+    found = sign * strength > 1e-9 * np.abs(strength).max(initial=0.0)
+    scale = np.where(found, sign / np.sqrt(np.where(found, np.abs(strength), 1.0)), 0.0)
+    filters = (form @ lower @ vector * scale[:, None, :]).transpose(0, 2, 1).copy()
+    for side in (slice(0, half), slice(half, count)):
+        for b in range(1, len(filters)):
+            left, _, right = np.linalg.svd(filters[b - 1, side] @ spectra[b] @ filters[b, side].T)
+            filters[b, side] = left @ right @ filters[b, side]
+    return filters, sign
+
+
+def interpolated(filters: FloatArray, bins: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Return filters at other bins, by straight lines; beyond the ends they are held."""
+    at = np.interp(wanted, bins, np.arange(bins.size))
+    low = np.minimum(at.astype(np.int64), bins.size - 2)
+    share = (at - low)[:, None, None]
+    return np.asarray((1 - share) * filters[low] + share * filters[low + 1])
