@@ -42,11 +42,19 @@ class FilterBank:
     filters : float32 array, shape (bin in the band, filter, channel)
     sign : float32 array, shape (filter,)
         Whether more energy asks for a path with a higher row number, +1, or a lower one, −1.
+    usual : float32 array, shape (channel, pattern)
+        Patterns of the window in whose power it shows whether there is the usual texture; 1 in all, on average.
     """
 
     basis: Float32Array
     filters: Float32Array
     sign: Float32Array
+    usual: Float32Array
+
+    def power(self, channels: Float32Array) -> Float32Array:
+        """Return how much texture there is in each column, of channels of shape (column, channel); 1 on average."""
+        seen = channels @ self.usual
+        return np.asarray(np.einsum("xk,xk->x", seen, seen))
 
     def heard(self, channels: Float32Array, *, band: Band, length: int) -> tuple[Float32Array, Float32Array]:
         """Return Σ ± p² and Σ p² in each column.
@@ -133,8 +141,29 @@ def root(covariance: FloatArray) -> FloatArray:
     return np.asarray(vector * np.sqrt(safe)[..., None, :])
 
 
-def common_channels(forms: tuple[FloatArray, ...], spectra: FloatArray, count: int) -> FloatArray:
-    """Return the channels of a window in which quadratic forms are best kept.
+def usual_patterns(covariance: FloatArray, count: int) -> FloatArray:
+    """Return the patterns that have most of a window's power, every row counting the same.
+
+    Parameters
+    ----------
+    covariance : float64 array, shape (row, row)
+        Of the rows in one column.
+    count : int
+
+    Returns
+    -------
+    float64 array, shape (row, pattern)
+        Σ_k (b_kᵀ x)² is 1 on average.
+    """
+    scale = 1 / np.sqrt(np.maximum(np.diag(covariance), 1e-30))
+    power, vector = np.linalg.eigh(scale[:, None] * covariance * scale)
+    return np.asarray(scale[:, None] * vector[:, -count:] / np.sqrt(max(power[-count:].sum(), 1e-30)))
+
+
+def common_channels(
+    forms: tuple[FloatArray, ...], spectra: FloatArray, patterns: FloatArray, count: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return the channels of a window in which quadratic forms are best kept, and some patterns whole.
 
     Parameters
     ----------
@@ -142,22 +171,29 @@ def common_channels(forms: tuple[FloatArray, ...], spectra: FloatArray, count: i
         Each counts as much as the others.
     spectra : float64 array, shape (bin, row, row)
         C_f.
+    patterns : float64 array, shape (row, pattern)
     count : int
+        More than there are patterns.
 
     Returns
     -------
-    float64 array, shape (row, channel)
+    basis : float64 array, shape (row, channel)
         Uncorrelated and of power 1 in the mean over the bins.
+    patterns : float64 array, shape (channel, pattern)
+        As sums of channels.
     """
     mean = root(spectra.mean(axis=0))
     total = np.zeros(mean.shape)
     for form in forms:
         # E[(Qx)(Qx)ᵀ]: in which directions a form looks, by how much it says
         looked = mean.T @ form @ spectra @ form @ mean
-        said = np.einsum("fij,fjk,fkl,fli->f", form, spectra, form, spectra, optimize=True)
-        total += (looked / np.maximum(np.mean(said), 1e-30)).sum(axis=0)
+        power = np.einsum("fij,fji->", form @ spectra, form @ spectra)
+        total += looked.sum(axis=0) / max(float(power), 1e-30)
     _, vector = np.linalg.eigh(total)
-    return np.asarray(np.linalg.solve(mean.T, vector[:, : -count - 1 : -1]))
+    kept = mean.T @ patterns
+    wanted = np.concatenate([kept, vector[:, : -(count - patterns.shape[1]) - 1 : -1]], axis=1)
+    orthogonal, _ = np.linalg.qr(wanted)
+    return np.asarray(np.linalg.solve(mean.T, orthogonal)), np.asarray(orthogonal.T @ kept)
 
 
 def through_channels(form: FloatArray, spectra: FloatArray, basis: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -20,30 +20,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import fft
 
-from gramoscope.conventions import BoolArray, FloatArray, IntArray
+from gramoscope.conventions import FloatArray, IntArray
 from gramoscope.disc.formats import Cut
 from gramoscope.errors import require
 from gramoscope.pickup.cartridge import Spread
-from gramoscope.pickup.texture.filter_bank import (
-    FilterBank,
-    common_channels,
-    interpolated,
-    strongest_filters,
-    through_channels,
-    witness_forms,
-)
-from gramoscope.pickup.texture.following import REACH, SHARP, across, wide_rows
+from gramoscope.pickup.texture.following import REACH, wide_rows
 from gramoscope.pickup.texture.layout import StripeLayout
-from gramoscope.pickup.texture.likelihood import (
-    StripeStatistics,
-    believable,
-    best_shares,
-    quiet_power,
-    said,
-    softened,
-)
+from gramoscope.pickup.texture.likelihood import StripeStatistics
 from gramoscope.pickup.texture.reading import Model, Rules, Stretch, clear_columns, evidence, step
-from gramoscope.pickup.texture.spectrum import Band, CrossSpectra, cross_spectra, precision, whitening_filter
+from gramoscope.pickup.texture.spectrum import Band, whitening_filter
+from gramoscope.pickup.texture.stripe_learning import StripeLearning, StripeMaterial
 from gramoscope.pickup.texture.tone import Tone, mean_level
 
 
@@ -63,29 +49,6 @@ class Lesson:
     without: tuple[Model, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Forms:
-    """What both witnesses say of a stripe, as quadratic forms of its window.
-
-    Attributes
-    ----------
-    witnesses : (float64 array, float64 array), shape (bin in the band, row, row)
-    spectra : float64 array, same shape
-        C_f of the window.
-    length : int
-        Of the transform whose bins these are.
-    """
-
-    witnesses: tuple[FloatArray, FloatArray]
-    spectra: FloatArray
-    length: int
-
-    def through(self, basis: FloatArray) -> Forms:
-        """Return what they say of channels, shape (row, channel)."""
-        (first, spectra), (second, _) = (through_channels(form, self.spectra, basis) for form in self.witnesses)
-        return Forms((first, second), spectra, self.length)
-
-
 @dataclass(frozen=True)
 class Learning:
     """How the passage is learned.
@@ -94,22 +57,18 @@ class Learning:
     ----------
     half_px : int
         Rows of a window on each side of a stripe.
-    largest_lag_px : int
-        Lags up to here may carry correlation: the light of points far from the stripe reaches its rows in large discs.
-    change_lag_px : int
-        The same for how correlation changes when a path moves: what is left out costs little, and the rest is known better.
+    largest_lag_px, change_lag_px, least_columns : int
+        See `StripeLearning`.
     band_low, band_high : float
         Frequencies along the groove that are used, cycles a pixel.
     loading : tuple of float
         Of each round; see `spectrum.precision`.
     compressions : tuple of float
         Tones to choose from, see `texture.tone`; rounds before the choice use the first.
-    least_columns : int
-        A stripe seen in fewer columns is not read.
     spread_noises, spread_limit_px : float
         Paths are heard so many of their standard errors on either side, and so many pixels at the most.
-    channels, filters : int
-        Of what is heard of a window, see `texture.filter_bank`; both even.
+    channels, patterns, filters : int
+        See `StripeLearning`.
     folds : int
         Parts of the learning groups, each read by what the others taught; 2 or more.
     """
@@ -125,6 +84,7 @@ class Learning:
     spread_noises: float = 4.0
     spread_limit_px: float = 0.8
     channels: int = 16
+    patterns: int = 4
     filters: int = 4
     folds: int = 4
 
@@ -133,14 +93,24 @@ class Learning:
         require(self.spread_noises >= 0, f"a spread of {self.spread_noises} standard errors", "0 or more")
         require(0 <= self.spread_limit_px < 1, f"a spread of up to {self.spread_limit_px} px", "0 … below 1")
         most = wide_rows(self.half_px)
-        require(2 <= self.channels <= most, f"{self.channels} channels", f"2 … {most}, the rows of a window")
-        possible = 2 <= self.filters <= self.channels and self.filters % 2 == 0
-        require(possible, f"{self.filters} filters", "an even number of them, 2 or more, and no more than channels")
+        require(self.stripe.channels <= most, f"{self.channels} channels", f"{most}, the rows of a window, or fewer")
         require(self.folds >= 2, f"{self.folds} folds", "2 or more")
         require(len(self.loading) >= 1, "no rounds", "at least one loading")
         require(len(self.compressions) >= 1, "no tone", "at least one compression; 0 leaves pictures as they are")
         require(all(0 <= q < 1 for q in self.compressions), f"compressions {self.compressions}", "0 … below 1")
         require(0 < self.band_low < self.band_high <= 0.5, f"a band of {self.band_low} … {self.band_high}", "0 … 0.5")
+
+    @property
+    def stripe(self) -> StripeLearning:
+        """How each stripe is learned."""
+        return StripeLearning(
+            self.largest_lag_px,
+            self.change_lag_px,
+            self.least_columns,
+            self.channels,
+            self.patterns,
+            self.filters,
+        )
 
     def learn(
         self,
@@ -244,13 +214,14 @@ class Learning:
         rules: Rules,
         spread: Spread,
     ) -> Lesson:
-        """Learn one stripe after the other: their spectra first, then how their scores behave."""
+        """Learn one stripe after the other."""
         whole: list[StripeStatistics | None] = []
         without: list[list[StripeStatistics | None]] = [[] for _ in range(self.folds)]
         for number in range(blank.layout.wall.size):
             alike = previous is not None and previous.tone == blank.tone
             before = previous.stripes[number] if previous is not None and alike else None
-            learned = self._stripe(stretches, fold, blank, number, before, loading, rules, spread)
+            material = StripeMaterial(stretches, fold, self.folds, blank, number, rules, spread)
+            learned = self.stripe.learn(material, before, loading)
             whole.append(learned[-1])
             for one, statistics in zip(without, learned, strict=False):
                 one.append(statistics)
@@ -258,160 +229,7 @@ class Learning:
             replace(blank, stripes=tuple(whole)), tuple(replace(blank, stripes=tuple(stripes)) for stripes in without)
         )
 
-    def _stripe(
-        self,
-        stretches: list[Stretch],
-        fold: IntArray,
-        blank: Model,
-        number: int,
-        before: StripeStatistics | None,
-        loading: float,
-        rules: Rules,
-        spread: Spread,
-    ) -> list[StripeStatistics | None]:
-        """Return what is known of a stripe without each fold, and from all of them."""
-        totals = [CrossSpectra(wide_rows(self.half_px), blank.length) for _ in range(self.folds)]
-        for one, k in zip(spread(lambda s: self._sums(s, blank, number, before, rules), stretches), fold, strict=True):
-            if one is not None:
-                totals[k].add(one)
-        parts = [self._together(totals, left) for left in (*range(self.folds), None)]
-        if min(part.columns for part in parts) < self.least_columns:
-            return [None] * len(parts)
-        known = list(spread(lambda part: self._forms(part, blank, loading), parts))
-        whole, everything = parts[-1], known[-1]
-        basis = common_channels(everything.witnesses, everything.spectra, self.channels)
-        blind = [
-            StripeStatistics(
-                FilterBank(basis.astype(np.float32), np.empty((0, 0, 0), np.float32), np.empty(0, np.float32)),
-                information=1.0,
-                score_power=1.0,
-                mean_score=0.0,
-                row_power=np.diag(part.covariance),
-                channel_power=np.diag(basis.T @ whole.covariance @ basis),
-                columns=part.columns,
-            )
-            for part in parts
-        ]
-        seen = [one.through(basis) for one in known]
-        alone = [[self._bank(form, one.spectra, basis, blank) for form in one.witnesses] for one in seen]
-        _, answers, powers = self._tried(
-            stretches, fold, blank, number, blind, [[bank for bank, _ in one] for one in alone], rules, spread
-        )
-        share = best_shares(answers, powers)
-        both = []
-        for one, banks in zip(seen, alone, strict=True):
-            weights = [s / loudness for s, (_, loudness) in zip(share, banks, strict=True)]
-            mixed = weights[0] * one.witnesses[0] + weights[1] * one.witnesses[1]
-            both.append([self._bank(mixed, one.spectra, basis, blank)[0]])
-        mean, answers, powers = self._tried(stretches, fold, blank, number, blind, both, rules, spread)
-        return [
-            replace(
-                one,
-                bank=bank,
-                mean_score=float(mean[0]),
-                information=max(float(answers[0]), 1e-6),
-                score_power=float(powers[0, 0]),
-            )
-            for one, (bank,) in zip(blind, both, strict=True)
-        ]
-
-    def _together(self, totals: list[CrossSpectra], left: int | None) -> CrossSpectra:
-        """Sums of all folds but one."""
-        total = CrossSpectra(totals[0].rows, totals[0].length)
-        for k, one in enumerate(totals):
-            if k != left:
-                total.add(one)
-        return total
-
-    def _forms(self, total: CrossSpectra, blank: Model, loading: float) -> Forms:
-        """What spectra say about paths, in the bins that they can tell apart."""
-        length = self._coarse_length
-        bins = blank.band.bins(length)
-        c = total.spectra(largest_lag_px=self.largest_lag_px, length=length)
-        near = total.spectra(largest_lag_px=self.change_lag_px, length=length)[bins]
-        inner = slice(REACH, -REACH)
-        moved = np.pad(across(2 * self.half_px + 1, SHARP), ((0, 0), (REACH - SHARP.size,) * 2)) @ near[:, :, inner]
-        inverse, noise = precision(c[:, inner, inner], band=bins, loading=loading, smooth_bins=SMOOTH_CYCLES * length)
-        forms = witness_forms(inverse, moved + moved.transpose(0, 2, 1), noise, spread_px=blank.spread_px)
-        return Forms(forms, c[bins], self._coarse_length)
-
-    @property
-    def _coarse_length(self) -> int:
-        """Of a transform whose bins spectra cut off at the largest lag can just tell apart."""
-        return int(fft.next_fast_len(2 * self.largest_lag_px + 2, real=True))
-
-    def _bank(self, form: FloatArray, spectra: FloatArray, basis: FloatArray, blank: Model) -> tuple[FilterBank, float]:
-        """The strongest filters of a form, in the bins of the model, of loudness 1, and how loud they were."""
-        filters, sign = strongest_filters(form, spectra, self.filters)
-        length = self._coarse_length
-        loudness = max(2 / length * float(np.einsum("fkc,fcd,fkd->", filters, spectra, filters, optimize=True)), 1e-30)
-        fine, coarse = (np.arange(n // 2 + 1)[blank.band.bins(n)] / n for n in (blank.length, length))
-        filters = interpolated(filters / np.sqrt(loudness), coarse, fine)
-        return FilterBank(basis.astype(np.float32), filters.astype(np.float32), sign.astype(np.float32)), loudness
-
-    def _sums(
-        self, stretch: Stretch, model: Model, number: int, before: StripeStatistics | None, rules: Rules
-    ) -> CrossSpectra | None:
-        """Cross-spectra of a stripe; None where too little of it can be seen."""
-        row, clear = self._clear(stretch, model, number, rules)
-        if not clear.any():
-            return None
-        window = model.window(stretch.in_tone(model.tone).columns, row)
-        inner = window[:, REACH:-REACH]
-        usual = before.row_power[REACH:-REACH] if before is not None else np.median(inner**2, axis=0) / 0.455
-        weight = softened(clear & believable(inner, usual, limits=rules.power_limits))
-        return cross_spectra(window, weight, length=model.length) if weight.sum() > 100 else None
-
-    def _clear(self, stretch: Stretch, model: Model, number: int, rules: Rules) -> tuple[FloatArray, BoolArray]:
-        """Where a stripe runs, and in which columns it can be seen."""
-        rows = model.layout.rows(stretch.displacement_px)
-        seen = model.layout.visible(rows, half_px=self.half_px)[number]
-        return rows[number], clear_columns(stretch, number, rows[number], seen, self.half_px, rules)
-
-    def _tried(
-        self,
-        stretches: list[Stretch],
-        fold: IntArray,
-        blank: Model,
-        number: int,
-        learned: list[StripeStatistics],
-        banks: list[list[FilterBank]],
-        rules: Rules,
-        spread: Spread,
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Measure the means of what banks say of a stripe, how they answer to a moved path, and their powers."""
-
-        def tried(pair: tuple[Stretch, int]) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-            stretch, left = pair
-            row, clear = self._clear(stretch, blank, number, rules)
-            if not clear.any():
-                return None
-            columns = stretch.in_tone(blank.tone).columns
-            here, low, high = (blank.channels(columns, row + move, banks[left][0]) for move in (0.0, -MOVE_PX, MOVE_PX))
-            weight = softened(clear & believable(here, learned[left].channel_power, limits=rules.power_limits))
-            if weight.sum() <= 100:
-                return None
-            u, below, above = (
-                np.array([said(z, weight, bank, band=blank.band, length=blank.length) for bank in banks[left]])
-                for z in (here, low, high)
-            )
-            return u, weight.astype(np.float64), (below - above) @ weight / (2 * MOVE_PX)
-
-        told = [one for one in spread(tried, zip(stretches, fold, strict=True)) if one is not None]
-        columns = max(sum(float(w.sum()) for _, w, _ in told), 1.0)
-        mean = sum((u @ w for u, w, _ in told), np.zeros(len(banks[0]))) / columns
-        quiet = [quiet_power(u - mean[:, np.newaxis], w) for u, w, _ in told]
-        powers = sum((power for power, _ in quiet), np.zeros((mean.size,) * 2)) / max(sum(s for _, s in quiet), 1e-12)
-        answers = sum((answer for _, _, answer in told), np.zeros(mean.size)) / columns
-        return mean, answers, powers
-
 
 def _seen_in(model: Model, stretches: list[Stretch], spread: Spread) -> list[Stretch]:
     """All stretches in the tone of a model."""
     return list(spread(lambda stretch: stretch.in_tone(model.tone), stretches))
-
-
-MOVE_PX = 0.1
-"""By which paths are moved to see how scores answer."""
-SMOOTH_CYCLES = 0.011
-"""Cycles a pixel over which what is known of the noise is smoothed."""

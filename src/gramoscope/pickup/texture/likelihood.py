@@ -56,9 +56,7 @@ class StripeStatistics:
     mean_score : float
         The constant that makes scores zero on average.
     row_power : float64 array, shape (row,)
-        Mean square of each row of the whitened window.
-    channel_power : float64 array, shape (channel,)
-        Of each channel of the bank.
+        Mean square of each row of the whitened window and beyond it.
     columns : float
         How many it was learned from.
     """
@@ -68,7 +66,6 @@ class StripeStatistics:
     score_power: float
     mean_score: float
     row_power: FloatArray
-    channel_power: FloatArray
     columns: float
 
     @property
@@ -157,24 +154,19 @@ def quiet_power(said: FloatArray, weight: FloatArray) -> tuple[FloatArray, float
     return np.asarray((spectrum @ spectrum.conj().T).real / (high - low)), float(np.sum(weight**2))
 
 
-def believable(
-    window: Float32Array, usual: FloatArray, *, limits: tuple[float, float], smooth_px: int = 25
-) -> BoolArray:
+def believable(power: FloatArray | Float32Array, *, limits: tuple[float, float], smooth_px: int = 25) -> BoolArray:
     """Tell which columns have about the texture that they should: no scratch, no speck, no missing wall.
 
     Parameters
     ----------
-    window : float32 array, shape (column, row)
-        Whitened; rows or channels.
-    usual : float64 array, shape (row,)
-        The mean square that each row has on average.
+    power : float array, shape (column,)
+        Of the texture, 1 on average.
     limits : (float, float)
-        Least and largest power, in units of the average, over `smooth_px` columns.
+        Least and largest power over `smooth_px` columns.
 
     Returns
     -------
     bool array, shape (column,)
     """
-    share = (1 / (usual.size * np.maximum(usual, 1e-12))).astype(np.float32)
-    local = ndimage.uniform_filter1d((window * window) @ share, smooth_px, mode="nearest")
+    local = ndimage.uniform_filter1d(power, smooth_px, mode="nearest")
     return np.asarray((local >= limits[0]) & (local <= limits[1]))

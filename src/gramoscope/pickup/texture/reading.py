@@ -200,7 +200,7 @@ def evidence(stretch: Stretch, model: Model, rules: Rules) -> Evidence:
         if not clear.any():
             continue
         heard = model.channels(seen.columns, rows[number], statistics.bank)
-        weight = softened(clear & believable(heard, statistics.channel_power, limits=rules.power_limits))
+        weight = softened(clear & believable(statistics.bank.power(heard), limits=rules.power_limits))
         u = said(heard, weight, statistics.bank, band=model.band, length=model.length)
         u = (u - statistics.mean_score) * statistics.trust
         weight64 = weight.astype(np.float64)

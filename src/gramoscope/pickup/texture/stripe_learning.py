@@ -1,0 +1,293 @@
+"""What a passage teaches about one stripe: how its rows hang together, and by which filters it is best heard.
+
+Cross-spectra first, of all stretches but those of one fold at a time; from them what both witnesses say, as quadratic forms;
+how the witnesses behave; and the filters of the best mixture of both. How those behave is measured again, for what they say
+is what is read by.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import fft
+
+from gramoscope.conventions import BoolArray, FloatArray, IntArray
+from gramoscope.errors import require
+from gramoscope.pickup.cartridge import Spread
+from gramoscope.pickup.texture.filter_bank import (
+    FilterBank,
+    common_channels,
+    interpolated,
+    strongest_filters,
+    through_channels,
+    usual_patterns,
+    witness_forms,
+)
+from gramoscope.pickup.texture.following import REACH, SHARP, across, wide_rows
+from gramoscope.pickup.texture.likelihood import (
+    StripeStatistics,
+    believable,
+    best_shares,
+    quiet_power,
+    said,
+    softened,
+)
+from gramoscope.pickup.texture.reading import Model, Rules, Stretch, clear_columns
+from gramoscope.pickup.texture.spectrum import CrossSpectra, cross_spectra, precision
+
+LEAST_WEIGHT = 100.0
+"""Columns of a stretch; with fewer it teaches nothing."""
+MOVE_PX = 0.1
+"""By which paths are moved to see how scores answer."""
+SMOOTH_CYCLES = 0.011
+"""Cycles a pixel over which what is known of the noise is smoothed."""
+INNER_ROWS = slice(REACH, -REACH)
+
+
+@dataclass(frozen=True, eq=False)
+class StripeMaterial:
+    """What there is to learn a stripe from.
+
+    Parameters
+    ----------
+    stretches : list of Stretch
+        In the tone of the model.
+    fold : int array, shape (stretch,)
+    folds : int
+    model : Model
+        Whose stripes are still to be learned.
+    number : int
+        Of the stripe.
+    rules : Rules
+    spread : callable
+        How a function is mapped over stretches.
+    """
+
+    stretches: list[Stretch]
+    fold: IntArray
+    folds: int
+    model: Model
+    number: int
+    rules: Rules
+    spread: Spread
+
+    def clear(self, stretch: Stretch) -> tuple[FloatArray, BoolArray]:
+        """Return where the stripe runs, and in which columns it can be seen."""
+        rows = self.model.layout.rows(stretch.displacement_px)
+        seen = self.model.layout.visible(rows, half_px=self.model.half_px)[self.number]
+        row = rows[self.number]
+        return row, clear_columns(stretch, self.number, row, seen, self.model.half_px, self.rules)
+
+    def sums(self, before: StripeStatistics | None) -> list[CrossSpectra]:
+        """Return the cross-spectra of all stretches without each fold, and of all of them."""
+
+        def summed(stretch: Stretch) -> CrossSpectra | None:
+            row, clear = self.clear(stretch)
+            if not clear.any():
+                return None
+            window = self.model.window(stretch.columns, row)
+            inner = window[:, INNER_ROWS]
+            usual = before.row_power[INNER_ROWS] if before is not None else np.median(inner**2, axis=0) / CHI2_MEDIAN
+            power = inner**2 @ (1 / (usual.size * np.maximum(usual, 1e-12)))
+            weight = softened(clear & believable(power, limits=self.rules.power_limits))
+            return cross_spectra(window, weight, length=self.model.length) if weight.sum() > LEAST_WEIGHT else None
+
+        rows = wide_rows(self.model.half_px)
+        of_fold = [CrossSpectra(rows, self.model.length) for _ in range(self.folds)]
+        for one, k in zip(self.spread(summed, self.stretches), self.fold, strict=True):
+            if one is not None:
+                of_fold[k].add(one)
+        totals = [CrossSpectra(rows, self.model.length) for _ in range(self.folds + 1)]
+        for left, total in enumerate(totals):
+            for k, one in enumerate(of_fold):
+                if k != left:
+                    total.add(one)
+        return totals
+
+    def tried(self, banks: list[list[FilterBank]]) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the means of what banks say, how they answer to a moved path, and their powers.
+
+        Parameters
+        ----------
+        banks : list of lists of FilterBank
+            Those by which the stretches of each fold are read, with one basis for all.
+        """
+        model = self.model
+
+        def told_of(pair: tuple[Stretch, int]) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+            stretch, heard_by = pair[0], banks[pair[1]]
+            row, clear = self.clear(stretch)
+            if not clear.any():
+                return None
+            here, low, high = (
+                model.channels(stretch.columns, row + move, heard_by[0]) for move in (0.0, -MOVE_PX, MOVE_PX)
+            )
+            weight = softened(clear & believable(heard_by[0].power(here), limits=self.rules.power_limits))
+            if weight.sum() <= LEAST_WEIGHT:
+                return None
+            u, below, above = (
+                np.array([said(z, weight, bank, band=model.band, length=model.length) for bank in heard_by])
+                for z in (here, low, high)
+            )
+            return u, weight.astype(np.float64), (below - above) @ weight / (2 * MOVE_PX)
+
+        pairs = zip(self.stretches, self.fold, strict=True)
+        told = [one for one in self.spread(told_of, pairs) if one is not None]
+        count = len(banks[0])
+        columns = max(sum(float(weight.sum()) for _, weight, _ in told), 1.0)
+        mean = sum((u @ weight for u, weight, _ in told), np.zeros(count)) / columns
+        quiet = [quiet_power(u - mean[:, np.newaxis], weight) for u, weight, _ in told]
+        powers = sum((power for power, _ in quiet), np.zeros((count, count))) / max(
+            sum(size for _, size in quiet), 1e-12
+        )
+        answers = sum((answer for _, _, answer in told), np.zeros(count)) / columns
+        return mean, answers, powers
+
+
+CHI2_MEDIAN = 0.455
+"""Median of the square of a standard normal variable."""
+
+
+@dataclass(frozen=True, eq=False)
+class Forms:
+    """What both witnesses say of a stripe, as quadratic forms of its window.
+
+    Attributes
+    ----------
+    witnesses : (float64 array, float64 array), shape (bin in the band, row, row)
+    spectra : float64 array, same shape
+        C_f of the window.
+    length : int
+        Of the transform whose bins these are.
+    """
+
+    witnesses: tuple[FloatArray, FloatArray]
+    spectra: FloatArray
+    length: int
+
+    def through(self, basis: FloatArray) -> Forms:
+        """Return what they say of channels, shape (row, channel)."""
+        (first, spectra), (second, _) = (through_channels(form, self.spectra, basis) for form in self.witnesses)
+        return Forms((first, second), spectra, self.length)
+
+    def loudness(self, filters: FloatArray) -> float:
+        """Return Σ p² of filters of this window in the mean of all columns."""
+        power = np.einsum("fkc,fcd,fkd->", filters, self.spectra, filters, optimize=True)
+        return max(2 / self.length * float(power), 1e-30)
+
+
+@dataclass(frozen=True)
+class StripeLearning:
+    """How a stripe is learned.
+
+    Parameters
+    ----------
+    largest_lag_px : int
+        Lags up to here may carry correlation: the light of points far from the stripe reaches its rows in large discs.
+    change_lag_px : int
+        The same for how correlation changes when a path moves: what is left out costs little, and the rest is known better.
+    least_columns : int
+        A stripe seen in fewer columns is not read.
+    channels, patterns, filters : int
+        Channels of a window that are drawn, those among them that show whether there is the usual texture, and filters, an
+        even number.
+    """
+
+    largest_lag_px: int = 150
+    change_lag_px: int = 30
+    least_columns: int = 6000
+    channels: int = 16
+    patterns: int = 4
+    filters: int = 4
+
+    def __post_init__(self) -> None:
+        require(
+            1 <= self.patterns < self.channels,
+            f"{self.patterns} of {self.channels} channels for the usual texture",
+            "at least one, and fewer than all",
+        )
+        require(
+            2 <= self.filters <= self.channels and self.filters % 2 == 0,
+            f"{self.filters} filters",
+            "an even number of them, 2 or more, and no more than channels",
+        )
+
+    @property
+    def length(self) -> int:
+        """Of a transform whose bins spectra that are cut off at the largest lag can just tell apart."""
+        return int(fft.next_fast_len(2 * self.largest_lag_px + 2, real=True))
+
+    def learn(
+        self, material: StripeMaterial, before: StripeStatistics | None, loading: float
+    ) -> list[StripeStatistics | None]:
+        """Return what is known of a stripe without each fold, and from all of them.
+
+        Parameters
+        ----------
+        material : StripeMaterial
+        before : StripeStatistics or None
+            What was known already, in the same tone.
+        loading : float
+            See `spectrum.precision`.
+
+        Returns
+        -------
+        list of StripeStatistics or None
+            All None when a fold left out leaves too few columns.
+        """
+        sums = material.sums(before)
+        if min(one.columns for one in sums) < self.least_columns:
+            return [None] * len(sums)
+        known = list(material.spread(lambda one: self._forms(one, material.model, loading), sums))
+        deaf = self._deaf(sums[-1], known[-1])
+        seen = [one.through(deaf.basis.astype(np.float64)) for one in known]
+        alone = [[self._heard_by(deaf, form, one, material.model) for form in one.witnesses] for one in seen]
+        _, answers, powers = material.tried([[bank for bank, _ in pair] for pair in alone])
+        shares = best_shares(answers, powers)
+        banks = []
+        for one, pair in zip(seen, alone, strict=True):
+            mixed = sum(
+                share / loudness * form for share, (_, loudness), form in zip(shares, pair, one.witnesses, strict=True)
+            )
+            banks.append(self._heard_by(deaf, np.asarray(mixed), one, material.model)[0])
+        mean, answers, powers = material.tried([[bank] for bank in banks])
+        return [
+            StripeStatistics(
+                bank,
+                information=max(float(answers[0]), 1e-6),
+                score_power=float(powers[0, 0]),
+                mean_score=float(mean[0]),
+                row_power=np.diag(one.covariance),
+                columns=one.columns,
+            )
+            for one, bank in zip(sums, banks, strict=True)
+        ]
+
+    def _forms(self, sums: CrossSpectra, model: Model, loading: float) -> Forms:
+        """What spectra say about paths, in the bins that they can tell apart."""
+        bins = model.band.bins(self.length)
+        wide = sums.spectra(largest_lag_px=self.largest_lag_px, length=self.length)
+        c = wide[:, INNER_ROWS, INNER_ROWS]
+        inverse, noise = precision(c, band=bins, loading=loading, smooth_bins=SMOOTH_CYCLES * self.length)
+        near = sums.spectra(largest_lag_px=self.change_lag_px, length=self.length)[bins]
+        slope = np.pad(across(c.shape[1], SHARP), ((0, 0), (REACH - SHARP.size,) * 2))
+        half = slope @ near[:, :, INNER_ROWS]
+        forms = witness_forms(inverse, half + half.transpose(0, 2, 1), noise, spread_px=model.spread_px)
+        return Forms(forms, wide[bins], self.length)
+
+    def _deaf(self, sums: CrossSpectra, known: Forms) -> FilterBank:
+        """A bank with channels, and no filters yet."""
+        patterns = np.zeros((sums.rows, self.patterns))
+        patterns[INNER_ROWS] = usual_patterns(sums.covariance[INNER_ROWS, INNER_ROWS], self.patterns)
+        basis, usual = common_channels(known.witnesses, known.spectra, patterns, self.channels)
+        none = np.empty((0, 0, self.channels), np.float32)
+        return FilterBank(basis.astype(np.float32), none, np.empty(0, np.float32), usual.astype(np.float32))
+
+    def _heard_by(self, deaf: FilterBank, form: FloatArray, seen: Forms, model: Model) -> tuple[FilterBank, float]:
+        """The bank with the strongest filters of a form, of loudness 1 together, and how loud they were."""
+        filters, sign = strongest_filters(form, seen.spectra, self.filters)
+        loudness = seen.loudness(filters)
+        fine, coarse = (np.arange(n // 2 + 1)[model.band.bins(n)] / n for n in (model.length, seen.length))
+        filters = interpolated(filters / np.sqrt(loudness), coarse, fine)
+        return replace(deaf, filters=filters.astype(np.float32), sign=sign.astype(np.float32)), loudness
