@@ -42,8 +42,8 @@ class FilterBank:
     filters : float32 array, shape (bin in the band, filter, channel)
     sign : float32 array, shape (filter,)
         Whether more energy asks for a path with a higher row number, +1, or a lower one, −1.
-    usual : float32 array, shape (channel, pattern)
-        Patterns of the window in whose power it shows whether there is the usual texture; 1 in all, on average.
+    usual : float32 array, shape (channel, channel)
+        What shows whether there is the usual texture; see `usual_power`.
     """
 
     basis: Float32Array
@@ -54,7 +54,7 @@ class FilterBank:
     def power(self, channels: Float32Array) -> Float32Array:
         """Return how much texture there is in each column, of channels of shape (column, channel); 1 on average."""
         seen = channels @ self.usual
-        return np.asarray(np.einsum("xk,xk->x", seen, seen))
+        return np.asarray(np.einsum("xc,xc->x", seen, seen))
 
     def heard(self, channels: Float32Array, *, band: Band, length: int) -> tuple[Float32Array, Float32Array]:
         """Return Σ ± p² and Σ p² in each column.
@@ -141,7 +141,7 @@ def root(covariance: FloatArray) -> FloatArray:
     return np.asarray(vector * np.sqrt(safe)[..., None, :])
 
 
-def usual_patterns(covariance: FloatArray, count: int) -> FloatArray:
+def strongest_patterns(covariance: FloatArray, count: int) -> FloatArray:
     """Return the patterns that have most of a window's power, every row counting the same.
 
     Parameters
@@ -153,16 +153,34 @@ def usual_patterns(covariance: FloatArray, count: int) -> FloatArray:
     Returns
     -------
     float64 array, shape (row, pattern)
-        Σ_k (b_kᵀ x)² is 1 on average.
     """
     scale = 1 / np.sqrt(np.maximum(np.diag(covariance), 1e-30))
-    power, vector = np.linalg.eigh(scale[:, None] * covariance * scale)
-    return np.asarray(scale[:, None] * vector[:, -count:] / np.sqrt(max(power[-count:].sum(), 1e-30)))
+    _, vector = np.linalg.eigh(scale[:, None] * covariance * scale)
+    return np.asarray(scale[:, None] * vector[:, -count:])
 
 
-def common_channels(
-    forms: tuple[FloatArray, ...], spectra: FloatArray, patterns: FloatArray, count: int
-) -> tuple[FloatArray, FloatArray]:
+def usual_power(covariance: FloatArray, basis: FloatArray, rows: slice) -> FloatArray:
+    """Return P so that |zᵀP|² is the mean power of rows, each by its usual power, as channels z tell it; 1 on average.
+
+    Parameters
+    ----------
+    covariance : float64 array, shape (row, row)
+        Of the rows in one column.
+    basis : float64 array, shape (row, channel)
+    rows : slice
+        Which rows count.
+
+    Returns
+    -------
+    float64 array, shape (channel, channel)
+    """
+    seen = basis.T @ covariance @ basis
+    expected = np.linalg.solve(seen, (covariance @ basis).T)[:, rows]
+    form = (expected / np.maximum(np.diag(covariance)[rows], 1e-30)) @ expected.T
+    return root(form / max(float(np.trace(form @ seen)), 1e-30))
+
+
+def common_channels(forms: tuple[FloatArray, ...], spectra: FloatArray, patterns: FloatArray, count: int) -> FloatArray:
     """Return the channels of a window in which quadratic forms are best kept, and some patterns whole.
 
     Parameters
@@ -177,10 +195,8 @@ def common_channels(
 
     Returns
     -------
-    basis : float64 array, shape (row, channel)
+    float64 array, shape (row, channel)
         Uncorrelated and of power 1 in the mean over the bins.
-    patterns : float64 array, shape (channel, pattern)
-        As sums of channels.
     """
     mean = root(spectra.mean(axis=0))
     total = np.zeros(mean.shape)
@@ -193,7 +209,7 @@ def common_channels(
     kept = mean.T @ patterns
     wanted = np.concatenate([kept, vector[:, : -(count - patterns.shape[1]) - 1 : -1]], axis=1)
     orthogonal, _ = np.linalg.qr(wanted)
-    return np.asarray(np.linalg.solve(mean.T, orthogonal)), np.asarray(orthogonal.T @ kept)
+    return np.asarray(np.linalg.solve(mean.T, orthogonal))
 
 
 def through_channels(form: FloatArray, spectra: FloatArray, basis: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -20,8 +20,9 @@ from gramoscope.pickup.texture.filter_bank import (
     common_channels,
     interpolated,
     strongest_filters,
+    strongest_patterns,
     through_channels,
-    usual_patterns,
+    usual_power,
     witness_forms,
 )
 from gramoscope.pickup.texture.following import REACH, SHARP, across, wide_rows
@@ -279,8 +280,9 @@ class StripeLearning:
     def _deaf(self, sums: CrossSpectra, known: Forms) -> FilterBank:
         """A bank with channels, and no filters yet."""
         patterns = np.zeros((sums.rows, self.patterns))
-        patterns[INNER_ROWS] = usual_patterns(sums.covariance[INNER_ROWS, INNER_ROWS], self.patterns)
-        basis, usual = common_channels(known.witnesses, known.spectra, patterns, self.channels)
+        patterns[INNER_ROWS] = strongest_patterns(sums.covariance[INNER_ROWS, INNER_ROWS], self.patterns)
+        basis = common_channels(known.witnesses, known.spectra, patterns, self.channels)
+        usual = usual_power(sums.covariance, basis, INNER_ROWS)
         none = np.empty((0, 0, self.channels), np.float32)
         return FilterBank(basis.astype(np.float32), none, np.empty(0, np.float32), usual.astype(np.float32))
 
