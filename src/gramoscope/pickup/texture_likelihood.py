@@ -26,7 +26,7 @@ from gramoscope.pickup.texture.calibration import aligned_layout, calibration_of
 from gramoscope.pickup.texture.groove_search import GrooveSearch
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.learning import Learning, Lesson
-from gramoscope.pickup.texture.reading import Evidence, Rules, Stretch, read, settled
+from gramoscope.pickup.texture.reading import Evidence, Rules, Stretch, read, settled, spaced
 from gramoscope.pickup.texture.sharpness import CELL_PX, sharpness
 from gramoscope.quality import Quality, no_flags
 from gramoscope.signal_path import FrameGroup, WallTrace
@@ -51,6 +51,8 @@ class TextureLikelihood:
         What the apparatus is.
     learn_groups : int
         From so many groups, spread over the passage, its texture is learned.
+    rounds : int
+        A stretch is read in so many rounds, by models spaced evenly over those that learning went through.
     edge_margin_px : float
         Stripes are not read nearer to the glass edge than this (beyond the window's own half height).
     exposure, search, learning, rules
@@ -59,6 +61,7 @@ class TextureLikelihood:
 
     bench: Bench
     learn_groups: int = 64
+    rounds: int = 5
     edge_margin_px: float = 6.0
     exposure: Exposure = field(default_factory=Exposure)
     search: GrooveSearch = field(default_factory=GrooveSearch)
@@ -67,6 +70,7 @@ class TextureLikelihood:
 
     def __post_init__(self) -> None:
         require(self.learn_groups >= 1, f"learning from {self.learn_groups} groups", "at least one")
+        require(self.rounds >= 1, f"reading in {self.rounds} rounds", "at least one")
 
     def learning_groups(self, group_count: int) -> IntArray:
         """Return which groups of a passage are learned from."""
@@ -226,7 +230,8 @@ class TexturePickup:
 
     def _read(self, laid: Overlay, group: FrameGroup) -> tuple[Stretch, Evidence]:
         fold = self.fold.get(group.number)
-        models = [lesson.whole if fold is None else lesson.without[fold] for lesson in self.lessons]
+        lessons = [self.lessons[i] for i in spaced(len(self.lessons), self.cartridge.rounds)]
+        models = [lesson.whole if fold is None else lesson.without[fold] for lesson in lessons]
         stretch = self.stretch(*laid_out(laid, group.white_level))
         return read(stretch, models, self.cartridge.bench.disc.cut, self.cartridge.rules)
 

@@ -154,15 +154,20 @@ class Rules:
     smooth_other_px : float
         The same for a direction that the cut does not use.
     largest_step_px : float
-        In one round.
+        In one round, before gain and momentum.
+    gain, momentum : float
+        While reading steps are so many times as long as scores ask for, and go on with so much of the step before.
+        Not while learning: what has been learned from paths that hurry is worse.
     """
 
     power_limits: tuple[float, float] = (0.2, 4.0)
     least_support: float = 0.15
-    smooth_px: float = 12.0
+    smooth_px: float = 10.0
     step_noise_px: float = 0.08
     smooth_other_px: float = 200.0
     largest_step_px: float = 1.0
+    gain: float = 1.3
+    momentum: float = 0.3
 
 
 def clear_columns(
@@ -287,8 +292,18 @@ def _smoothed(score: FloatArray, information: FloatArray, smooth_px: float, rule
 def read(stretch: Stretch, models: Sequence[Model], cut: Cut, rules: Rules) -> tuple[Stretch, Evidence]:
     """Return the stretch with its path improved by one round with each model, and the evidence about that path."""
     seen = stretch
+    move: FloatArray = np.zeros(())
     for model in models:
         if seen.tone != model.tone:
             seen = replace(stretch, displacement_px=seen.displacement_px).in_tone(model.tone)
-        seen = seen.moved(step(evidence(seen, model, rules), cut, rules))
+        # scores answer less to a path that is far off, and what was missing before is mostly missing still
+        move = rules.gain * step(evidence(seen, model, rules), cut, rules) + rules.momentum * move
+        seen = seen.moved(move)
     return seen, evidence(seen, models[-1], rules)
+
+
+def spaced(count: int, rounds: int) -> list[int]:
+    """Return which of so many models to read by in so many rounds: evenly spaced, the last one among them."""
+    return sorted(
+        {-(-count * (k + 1) // rounds) - 1 for k in range(min(count, rounds))} if rounds < count else range(count)
+    )
