@@ -15,10 +15,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numba
 import numpy as np
 import numpy.typing as npt
+from numpy.polynomial import polynomial
 
 from gramoscope.conventions import FloatArray, IntArray
 from gramoscope.quality import Quality
@@ -82,14 +84,20 @@ def _textured(strip: npt.NDArray[np.float32]) -> IntArray:
     return np.flatnonzero(power >= TEXTURED * power.max(initial=0.0))
 
 
+@lru_cache
+def _lagrange_polynomials(reach: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Coefficients of Lagrange's polynomials and of their two derivatives, shape (node, power), the lowest power first."""
+    nodes = np.arange(-reach, reach + 1, dtype=np.float64)
+    basis = np.array(
+        [polynomial.polyfromroots(nodes[nodes != node]) / np.prod(node - nodes[nodes != node]) for node in nodes]
+    )
+    return basis, polynomial.polyder(basis, axis=1), polynomial.polyder(basis, 2, axis=1)
+
+
 def lagrange(reach: int, place: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the weights of values at −reach … reach for the polynomial through them, and for its two derivatives."""
-    nodes = np.arange(-reach, reach + 1)
-    polynomials = []
-    for node in nodes:
-        others = nodes[nodes != node]
-        polynomials.append(np.poly1d(np.poly(others) / np.prod(node - others)))
-    value, slope, bend = (np.array([p.deriv(order)(place) for p in polynomials]) for order in range(3))
+    powers = place ** np.arange(2 * reach + 1)
+    value, slope, bend = (basis @ powers[: basis.shape[1]] for basis in _lagrange_polynomials(reach))
     return value, slope, bend
 
 

@@ -68,7 +68,7 @@ def test_the_best_path_is_that_of_trying_all(seed: int) -> None:
         return float(value)
 
     best = max(product(places, repeat=5), key=total)
-    path, value = best_path(score, steps, costs)
+    path, value = best_path(score.copy(), steps, costs)
     assert value == pytest.approx(total(best))
     np.testing.assert_array_equal(path.T, best)
 
@@ -85,8 +85,8 @@ def test_a_step_costs_as_its_square() -> None:
     score = np.full((2, 3, 1), -10.0)
     score[0, 0], score[1, 0], score[1, 2] = 0.0, 0.0, 1.0
     steps = np.array([2, 0])
-    assert best_path(score, steps, np.array([0.24, 0.0]))[1] == pytest.approx(1 - 4 * 0.24)
-    assert best_path(score, steps, np.array([0.26, 0.0]))[1] == 0.0
+    assert best_path(score.copy(), steps, np.array([0.24, 0.0]))[1] == pytest.approx(1 - 4 * 0.24)
+    assert best_path(score.copy(), steps, np.array([0.26, 0.0]))[1] == 0.0
 
 
 QUIET = _wave(9, 41) + _wave(4, 17)

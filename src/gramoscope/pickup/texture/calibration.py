@@ -50,11 +50,11 @@ def aligned_layout(
     return layout, found
 
 
-def _found(search: GrooveSearch, layout: StripeLayout, cut: Cut, sharp: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _found(search: GrooveSearch, layout: StripeLayout, cut: Cut, sharp: Float32Array) -> tuple[FloatArray, FloatArray]:
     return search.find(sharp, layout, cut=cut)
 
 
-def _shifts(sharp: list[FloatArray], paths: list[FloatArray], layout: StripeLayout) -> FloatArray:
+def _shifts(sharp: list[Float32Array], paths: list[FloatArray], layout: StripeLayout) -> FloatArray:
     """How far each stripe lies from the layout, rows, the stripe of the outer wall that is seen most kept in place."""
     aside = np.arange(-REACH_PX, REACH_PX + 1)
     profile, seen = np.zeros((layout.wall.size, aside.size)), np.zeros(layout.wall.size)

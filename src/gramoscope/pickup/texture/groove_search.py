@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from gramoscope.conventions import INNER, OUTER, FloatArray
+from gramoscope.conventions import INNER, OUTER, Float32Array, FloatArray
 from gramoscope.disc.formats import Cut
 from gramoscope.errors import require
 from gramoscope.pickup.texture.layout import BOTTOM_PX, StripeLayout, wall_sign
@@ -22,57 +22,86 @@ from gramoscope.pickup.texture.sharpness import ridges
 
 
 @numba.njit(cache=True, nogil=True)
-def _better(from_, cost, number, top, choice):  # type: ignore[no-untyped-def]
+def _raise(from_, cost, top):  # type: ignore[no-untyped-def]
     for j in range(top.size):
-        value = from_[j] - cost
-        better = value > top[j]
-        top[j] = value if better else top[j]
-        choice[j] = number if better else choice[j]
+        top[j] = max(top[j], from_[j] - cost)
+
+
+@numba.njit(cache=True, nogil=True)
+def _add(values, total):  # type: ignore[no-untyped-def]
+    for j in range(total.size):
+        total[j] += values[j]
 
 
 @numba.njit(cache=True, nogil=True)
 def best_path(score, largest_step, step_cost):  # type: ignore[no-untyped-def]
     """Return the path through score[cell, i, j] with the largest sum, and that sum (A. Viterbi, 1967).
 
-    Quickest where the last axis is the long one.
+    Quickest where the last axis is the long one. Scores are overwritten by the largest sums of paths that end there: what
+    came before a place is found again on the way back.
     From cell to cell i and j change by at most `largest_step[0]` and `[1]`, each at a cost of its `step_cost` times the
-    square of the change.
+    square of the change; as these add up, the best step in j is found first and that in i after it.
     """
     cells, rows, columns = score.shape
     reach_i, reach_j = largest_step[0], largest_step[1]
-    best = score[0].copy()
-    back = np.zeros((cells, rows, columns), np.int16)
-    new = np.empty((rows, columns), score.dtype)
+    real = score.dtype.type
+    along, new = np.empty((rows, columns), score.dtype), np.empty(columns, score.dtype)
     for cell in range(1, cells):
-        new[:] = -np.inf
         for i in range(rows):
-            for di in range(-min(reach_i, i), min(reach_i, rows - 1 - i) + 1):
-                for dj in range(-reach_j, reach_j + 1):
-                    number = np.int16((di + reach_i) * (2 * reach_j + 1) + dj + reach_j)
-                    cost = score.dtype.type(step_cost[0] * di * di + step_cost[1] * dj * dj)
-                    here, there = slice(max(-dj, 0), columns - max(dj, 0)), slice(max(dj, 0), columns - max(-dj, 0))
-                    _better(best[i + di, there], cost, number, new[i, here], back[cell, i, here])
-        new += score[cell]
-        best[:] = new
+            along[i] = score[cell - 1, i]
+            for step in range(1, reach_j + 1):
+                cost = real(step_cost[1] * step * step)
+                _raise(score[cell - 1, i, step:], cost, along[i, : columns - step])
+                _raise(score[cell - 1, i, : columns - step], cost, along[i, step:])
+        for i in range(rows):
+            new[:] = along[i]
+            for step in range(1, reach_i + 1):
+                cost = real(step_cost[0] * step * step)
+                if i + step < rows:
+                    _raise(along[i + step], cost, new)
+                if i - step >= 0:
+                    _raise(along[i - step], cost, new)
+            _add(new, score[cell, i])
     path = np.empty((2, cells), np.int64)
-    end = np.argmax(best)
+    end = np.argmax(score[cells - 1])
     i, j = end // columns, end % columns
-    total = best[i, j]
+    total = score[cells - 1, i, j]
     path[0, -1], path[1, -1] = i, j
     for cell in range(cells - 1, 0, -1):
-        choice = back[cell, i, j]
-        i += choice // (2 * reach_j + 1) - reach_i
-        j += choice % (2 * reach_j + 1) - reach_j
+        best, from_i, from_j = -np.inf, i, j
+        for m in range(max(0, i - reach_i), min(rows, i + reach_i + 1)):
+            for n in range(max(0, j - reach_j), min(columns, j + reach_j + 1)):
+                value = score[cell - 1, m, n] - step_cost[0] * (m - i) ** 2 - step_cost[1] * (n - j) ** 2
+                if value > best:
+                    best, from_i, from_j = value, m, n
+        i, j = from_i, from_j
         path[0, cell - 1], path[1, cell - 1] = i, j
     return path, total
 
 
 @numba.njit(cache=True, nogil=True)
-def _add_stripe(wide, rows, seen, absent, score):  # type: ignore[no-untyped-def]
-    for cell in range(score.shape[0]):
-        for place in range(rows.size):
-            if seen[place]:
-                score[cell, place] += wide[cell, rows[place]] - absent
+def _add_above(values, level, total):  # type: ignore[no-untyped-def]
+    for k in range(total.size):
+        total[k] += values[k] - level
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_stripe(coarse, first_row, seen_rows, absent, score):  # type: ignore[no-untyped-def]
+    """Add a stripe to the scores of displacements whose first one puts it into `first_row`, for each vertical one.
+
+    coarse[row % GRID_PX, cell] holds every third row, so that neighbouring displacements lie side by side.
+    """
+    cells, verticals, laterals = score.shape
+    for v in range(verticals):
+        low, high = seen_rows[v]
+        start = max(0, -((first_row[v] - low) // GRID_PX))
+        stop = min(laterals, (high - first_row[v]) // GRID_PX + 1)
+        if stop <= start:
+            continue
+        row = first_row[v] + GRID_PX * start
+        at = row // GRID_PX
+        for cell in range(cells):
+            _add_above(coarse[row % GRID_PX, cell, at : at + stop - start], absent, score[cell, v, start:stop])
 
 
 @dataclass(frozen=True)
@@ -111,12 +140,12 @@ class GrooveSearch:
         require(self.usual_swing_px > 0, f"a usual swing of {self.usual_swing_px} px", "above 0")
         require(self.usual_drift_px > 0, f"a usual drift of {self.usual_drift_px} px", "above 0")
 
-    def find(self, sharp: FloatArray, layout: StripeLayout, *, cut: Cut) -> tuple[FloatArray, FloatArray]:
+    def find(self, sharp: Float32Array, layout: StripeLayout, *, cut: Cut) -> tuple[FloatArray, FloatArray]:
         """Return where both walls run.
 
         Parameters
         ----------
-        sharp : float64 array, shape (cell, row)
+        sharp : float32 array, shape (cell, row)
             From `texture.sharpness`.
         layout : StripeLayout
         cut : {"lateral", "vertical", "stereo"}
@@ -133,7 +162,7 @@ class GrooveSearch:
         common = np.array([lateral - vertical, lateral + vertical])
         return self._own_paths(ridge, layout, common)
 
-    def _common(self, ridge: FloatArray, layout: StripeLayout, cut: Cut) -> tuple[FloatArray, FloatArray]:
+    def _common(self, ridge: Float32Array, layout: StripeLayout, cut: Cut) -> tuple[FloatArray, FloatArray]:
         """Return the lateral and the vertical displacement that suit all stripes, on a grid of `GRID_PX`."""
         height = ridge.shape[1]
         reach = {
@@ -143,25 +172,33 @@ class GrooveSearch:
         }[cut]
         lateral, vertical = (GRID_PX * np.arange(-int(r // GRID_PX), int(r // GRID_PX) + 1) for r in reach)
         # on a coarse grid a ridge is where any of its rows is
-        wide = np.maximum(ridge, np.maximum(np.roll(ridge, 1, axis=1), np.roll(ridge, -1, axis=1))).astype(np.float32)
+        wide = np.maximum(ridge, np.maximum(np.roll(ridge, 1, axis=1), np.roll(ridge, -1, axis=1)))
+        beyond = -height % GRID_PX
+        coarse = np.pad(wide, ((0, 0), (0, beyond))).reshape(len(ridge), -1, GRID_PX).transpose(2, 0, 1)
+        coarse = np.ascontiguousarray(coarse, np.float32)
         used = [cut != "vertical", cut != "lateral"]
         large = [self.usual_swing_px if use else self.usual_drift_px for use in used]
         usual = (lateral / large[0]) ** 2 + (vertical[:, None] / large[1]) ** 2
-        score = np.tile(np.float32(-self.swing_cost * usual), (len(ridge), 1, 1))
-        signs = wall_sign(layout.wall)
+        score = np.empty((len(ridge), *usual.shape), np.float32)
+        score[:] = -self.swing_cost * usual
+        signs = wall_sign(layout.wall).astype(np.int64)
         stripes = zip(layout.rest_row, signs, layout.first_row, layout.last_row, layout.from_bottom_px, strict=True)
         for rest, sign, low, high, from_bottom in stripes:
-            rows = np.round(rest + lateral + sign * vertical[:, None]).astype(np.int64)
-            depth = from_bottom - vertical[:, None]
-            seen = (rows >= low) & (rows <= high) & (depth > BOTTOM_PX) & (depth < layout.half_width_px)
-            _add_stripe(wide, rows.ravel(), seen.ravel(), np.float32(self.absent), score.reshape(len(ridge), -1))
+            first_row = round(rest) + lateral[0] + sign * vertical
+            depth = from_bottom - vertical
+            on_wall = (depth > BOTTOM_PX) & (depth < layout.half_width_px)
+            rows = np.array([max(np.ceil(low), 0), min(np.floor(high), height - 1)])
+            seen = np.where(on_wall[:, None], rows, [0, -1]).astype(np.int64)
+            _add_stripe(coarse, first_row, seen, np.float32(self.absent), score)
         steps = np.array([1 if use else int(len(ridge) > 1) for use in used])
         # what the cut does not use changes slowly: a step of one grid point costs as much as a cell without its stripes
         costs = np.array([self.step_cost * GRID_PX if use else 1.0 for use in used])
         path, _ = best_path(score, steps[::-1], costs[::-1])
         return lateral[path[1]].astype(np.float64), vertical[path[0]].astype(np.float64)
 
-    def _own_paths(self, ridge: FloatArray, layout: StripeLayout, common: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _own_paths(
+        self, ridge: Float32Array, layout: StripeLayout, common: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Let each wall look for its stripes, row by row, near the common path."""
         path = common.copy()
         aside = np.arange(-int(self.wall_reach_px), int(self.wall_reach_px) + 1)
@@ -179,7 +216,7 @@ class GrooveSearch:
         return path, support
 
 
-def _ridges_at(ridge: FloatArray, layout: StripeLayout, displacement_px: FloatArray) -> FloatArray:
+def _ridges_at(ridge: Float32Array, layout: StripeLayout, displacement_px: FloatArray) -> FloatArray:
     """Return the ridges, shape (stripe, cell, place), at displacements of shape (cell, place); 0 out of sight."""
     rows = np.round(layout.rest_row[:, None, None] + displacement_px).astype(np.int64)
     seen = (rows >= layout.first_row[:, None, None]) & (rows <= layout.last_row[:, None, None])

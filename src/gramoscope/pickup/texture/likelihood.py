@@ -24,8 +24,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
-from scipy import fft, ndimage
+from scipy import fft
 
 from gramoscope.conventions import BoolArray, Float32Array, FloatArray
 from gramoscope.pickup.texture.filter_bank import FilterBank
@@ -93,8 +94,31 @@ def said(channels: Float32Array, weight: Float32Array, bank: FilterBank, *, band
     float64 array, shape (column,)
     """
     score, loudness = bank.heard(channels * weight[:, None], band=band, length=length)
-    local = ndimage.gaussian_filter1d(loudness, LOUDNESS_PX, mode="nearest")
-    return np.asarray(score / (TEMPER + local), np.float64)
+    u = np.empty(score.size)
+    _temper(score, loudness, _LOUDNESS_BELL, TEMPER, u)
+    return u
+
+
+_LOUDNESS_BELL = np.exp(-0.5 * (np.arange(int(4 * LOUDNESS_PX) + 1) / LOUDNESS_PX) ** 2).astype(np.float32)
+_LOUDNESS_BELL /= 2 * _LOUDNESS_BELL.sum() - _LOUDNESS_BELL[0]
+
+
+@numba.njit(cache=True, nogil=True, fastmath={"contract"})
+def _add_scaled(w, before, after, out):  # type: ignore[no-untyped-def]
+    for x in range(out.size):
+        out[x] += w * (before[x] + after[x])
+
+
+@numba.njit(cache=True, nogil=True)
+def _temper(score, loudness, half_bell, temper, u):  # type: ignore[no-untyped-def]
+    width, reach = score.size, half_bell.size - 1
+    wide = np.empty(width + 2 * reach, np.float32)
+    wide[:reach], wide[reach : reach + width], wide[reach + width :] = loudness[0], loudness, loudness[-1]
+    local = half_bell[0] * loudness
+    for k in range(1, reach + 1):
+        _add_scaled(half_bell[k], wide[reach - k : reach - k + width], wide[reach + k : reach + k + width], local)
+    for x in range(width):
+        u[x] = score[x] / (temper + local[x])
 
 
 def best_shares(answers: FloatArray, powers: FloatArray) -> FloatArray:
@@ -125,11 +149,29 @@ def best_shares(answers: FloatArray, powers: FloatArray) -> FloatArray:
 
 def softened(valid: BoolArray) -> Float32Array:
     """Return a weight that is 1 well inside the valid columns and falls softly to 0 before their ends."""
-    if valid.all():
-        return np.ones(valid.size, np.float32)
-    core = ndimage.binary_erosion(valid, np.ones(2 * TAPER_PX + 1, np.bool_), border_value=1)
-    bell = np.hanning(2 * TAPER_PX + 3)[1:-1]
-    return np.asarray(ndimage.convolve1d(core.astype(np.float64), bell / bell.sum(), mode="nearest"), np.float32)
+    weight = np.ones(valid.size, np.float32)
+    if not valid.all():
+        _soften(valid, _TAPER, weight)
+    return weight
+
+
+_TAPER = np.hanning(2 * TAPER_PX + 3)[1:-1]
+_TAPER /= _TAPER.sum()
+
+
+@numba.njit(cache=True, nogil=True)
+def _soften(valid, bell, weight):  # type: ignore[no-untyped-def]
+    """Erode by half the bell, beyond the ends all being valid, and smooth by it, the ends being held."""
+    width, reach = valid.size, bell.size // 2
+    core = np.ones(width)
+    for x in range(width):
+        if not valid[x]:
+            core[max(0, x - reach) : x + reach + 1] = 0
+    for x in range(width):
+        total = 0.0
+        for k in range(bell.size):
+            total += bell[k] * core[min(max(x + k - reach, 0), width - 1)]
+        weight[x] = total
 
 
 def quiet_power(said: FloatArray, weight: FloatArray) -> tuple[FloatArray, float]:
@@ -168,5 +210,19 @@ def believable(power: FloatArray | Float32Array, *, limits: tuple[float, float],
     -------
     bool array, shape (column,)
     """
-    local = ndimage.uniform_filter1d(power, smooth_px, mode="nearest")
-    return np.asarray((local >= limits[0]) & (local <= limits[1]))
+    told = np.empty(power.size, np.bool_)
+    _within(power, smooth_px // 2, *limits, told)
+    return told
+
+
+@numba.njit(cache=True, nogil=True)
+def _within(power, reach, low, high, told):  # type: ignore[no-untyped-def]
+    """Whether the mean over ± reach columns, the ends being held, lies within limits."""
+    width = power.size
+    total = 0.0
+    for k in range(-reach, reach + 1):
+        total += power[min(max(k, 0), width - 1)]
+    for x in range(width):
+        mean = total / (2 * reach + 1)
+        told[x] = low <= mean <= high
+        total += power[min(x + 1 + reach, width - 1)] - power[max(x - reach, 0)]

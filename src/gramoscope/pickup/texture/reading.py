@@ -11,10 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numba
 import numpy as np
-from scipy import fft, ndimage
+import numpy.typing as npt
+from scipy import fft
 
 from gramoscope.conventions import INNER, OUTER, BoolArray, Float32Array, FloatArray
 from gramoscope.disc.formats import Cut
@@ -174,8 +176,10 @@ def clear_columns(
     stretch: Stretch, number: int, stripe_row: FloatArray, visible: BoolArray, half_px: int, rules: Rules
 ) -> BoolArray:
     """Tell in which columns a stripe is there and can be seen whole, by enough frames and without burnt places."""
-    burnt = _burnt_share(stretch.burnt, stripe_row, half_px) > BURNT_SHARE
-    return np.asarray(visible & stretch.usable & ~burnt & (stretch.support[number] >= rules.least_support))
+    clear = visible & stretch.usable & (stretch.support[number] >= rules.least_support)
+    if clear.any() and stretch.burnt.any():
+        clear &= _burnt_share(stretch.burnt, stripe_row, half_px) <= BURNT_SHARE
+    return np.asarray(clear)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -190,8 +194,8 @@ def _burnt_share(burnt, stripe_row, half_px):  # type: ignore[no-untyped-def]
     return share / (2 * half_px + 1)
 
 
-def evidence(stretch: Stretch, model: Model, rules: Rules) -> Evidence:
-    """Return what all stripes say about the present path of both walls."""
+def evidence(stretch: Stretch, model: Model, rules: Rules, *, judged: bool = True) -> Evidence:
+    """Return what all stripes say about the present path of both walls, and whether that surprises, if it is to be judged."""
     width = stretch.columns.shape[0]
     score, information, surprise = np.zeros((2, width)), np.zeros((2, width)), np.zeros((2, 2))
     rows = model.layout.rows(stretch.displacement_px)
@@ -211,8 +215,9 @@ def evidence(stretch: Stretch, model: Model, rules: Rules) -> Evidence:
         weight64 = weight.astype(np.float64)
         score[wall] += weight64 * u
         information[wall] += weight64 * statistics.trust * statistics.information
-        power, columns = quiet_power(u[np.newaxis], weight64)
-        surprise[wall] += power[0, 0], columns * statistics.trust**2 * statistics.score_power
+        if judged:
+            power, columns = quiet_power(u[np.newaxis], weight64)
+            surprise[wall] += power[0, 0], columns * statistics.trust**2 * statistics.score_power
     with np.errstate(invalid="ignore", divide="ignore"):
         return Evidence(score, information, surprise[:, 0] / surprise[:, 1])
 
@@ -265,28 +270,36 @@ def _smoothing_px(information: FloatArray, rules: Rules) -> float:
     return float(np.clip(wanted, rules.smooth_px, 2 * rules.smooth_px))
 
 
-FEW_PX = 40.0
-"""Kernels of a smaller σ are quicker without transforms."""
-
-
 def gaussian(values: FloatArray, sigma: float) -> FloatArray:
-    """Return values smoothed by a Gaussian that is cut off at four σ; beyond the ends the last value is held."""
-    if sigma < FEW_PX:
-        return np.asarray(ndimage.gaussian_filter1d(values, sigma, mode="nearest"))
-    radius = int(4 * sigma + 0.5)
+    """Return rows smoothed by a Gaussian that is cut off at four σ; beyond the ends the last value is held.
+
+    Parameters
+    ----------
+    values : float64 array, shape (…, column)
+    sigma : float
+        Columns.
+    """
+    radius, width = int(4 * sigma + 0.5), values.shape[-1]
+    held = np.concatenate(
+        [np.repeat(values[..., :1], radius, axis=-1), values, np.repeat(values[..., -1:], radius, axis=-1)], axis=-1
+    )
+    length = fft.next_fast_len(held.shape[-1], real=True)
+    smooth = fft.irfft(fft.rfft(held, length) * _bell_spectrum(sigma, radius, length), length)
+    return np.asarray(smooth[..., 2 * radius : 2 * radius + width])
+
+
+@lru_cache(maxsize=64)
+def _bell_spectrum(sigma: float, radius: int, length: int) -> npt.NDArray[np.complex128]:
     bell = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
-    held = np.pad(values, radius, mode="edge")
-    length = fft.next_fast_len(held.size, real=True)
-    smooth = fft.irfft(fft.rfft(held, length) * fft.rfft(bell / bell.sum(), length), length)
-    return np.asarray(smooth[2 * radius : 2 * radius + values.size])
+    return np.asarray(fft.rfft(bell / bell.sum(), length))
 
 
 def _smoothed(score: FloatArray, information: FloatArray, smooth_px: float, rules: Rules) -> FloatArray:
     most = float(information.max(initial=0.0))
     if most == 0:
         return np.zeros_like(score)
-    top, bottom = gaussian(score, smooth_px), gaussian(information, smooth_px)
-    return np.clip(top / np.maximum(bottom, 0.05 * most), -rules.largest_step_px, rules.largest_step_px)
+    top, bottom = gaussian(np.stack([score, information]), smooth_px)
+    return np.asarray(np.clip(top / np.maximum(bottom, 0.05 * most), -rules.largest_step_px, rules.largest_step_px))
 
 
 def read(stretch: Stretch, models: Sequence[Model], cut: Cut, rules: Rules) -> tuple[Stretch, Evidence]:
@@ -297,7 +310,7 @@ def read(stretch: Stretch, models: Sequence[Model], cut: Cut, rules: Rules) -> t
         if seen.tone != model.tone:
             seen = replace(stretch, displacement_px=seen.displacement_px).in_tone(model.tone)
         # scores answer less to a path that is far off, and what was missing before is mostly missing still
-        move = rules.gain * step(evidence(seen, model, rules), cut, rules) + rules.momentum * move
+        move = rules.gain * step(evidence(seen, model, rules, judged=False), cut, rules) + rules.momentum * move
         seen = seen.moved(move)
     return seen, evidence(seen, models[-1], rules)
 

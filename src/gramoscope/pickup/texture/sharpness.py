@@ -11,7 +11,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from gramoscope.conventions import Float32Array, FloatArray
+from gramoscope.conventions import Float32Array
 
 CELL_PX = 8
 """Columns in a cell."""
@@ -30,7 +30,7 @@ def _cell_energy(columns, energy):  # type: ignore[no-untyped-def]
                 energy[cell, y] += difference * difference
 
 
-def sharpness(columns: Float32Array, *, ceiling: float = 1.5) -> FloatArray:
+def sharpness(columns: Float32Array, *, ceiling: float = 1.5) -> Float32Array:
     """Return how sharp the picture is, cell by cell.
 
     Parameters
@@ -41,32 +41,54 @@ def sharpness(columns: Float32Array, *, ceiling: float = 1.5) -> FloatArray:
 
     Returns
     -------
-    float64 array, shape (cell, row)
+    float32 array, shape (cell, row)
         Root of the energy above the noise, a little smoothed, in units of the sharpest row of a typical cell.
     """
     cells = columns.shape[0] // CELL_PX
     energy = np.zeros((cells, columns.shape[1]), np.float32)
     _cell_energy(columns, energy)
     energy = _smoothed(energy)
-    noise = float(np.quantile(np.median(energy, axis=0), 0.1))
-    amplitude = np.sqrt(np.maximum(energy - noise, 0.0))
-    reference = float(np.median(amplitude.max(axis=1)))
-    return np.minimum(amplitude / reference, ceiling) if reference > 0 else np.zeros_like(amplitude)
+    # a row is quiet all along the stretch, or it is not
+    noise = np.float32(np.quantile(np.median(energy[::EVERY], axis=0), 0.1))
+    amplitude = np.sqrt(np.maximum(energy - noise, np.float32(0)))
+    reference = np.float32(np.median(amplitude.max(axis=1)))
+    return np.minimum(amplitude / reference, np.float32(ceiling)) if reference > 0 else np.zeros_like(amplitude)
 
 
-def _smoothed(values: FloatArray) -> FloatArray:
+EVERY = 4
+"""Of so many cells one is looked at to find out how quiet the quietest rows are."""
+
+
+def _smoothed(values: Float32Array) -> Float32Array:
     """A triangle of three cells along the groove: texture is random, and one cell is a poor witness."""
-    padded = np.pad(values, ((2, 2), (0, 0)), mode="edge")
-    total = padded[:-4] + 2 * padded[1:-3] + 3 * padded[2:-2] + 2 * padded[3:-1] + padded[4:]
-    return np.asarray(total / 9, np.float64)
+    padded = np.pad(values / np.float32(9), ((2, 2), (0, 0)), mode="edge")
+    total = padded[:-4] + padded[4:]
+    total += 2 * (padded[1:-3] + padded[3:-1])
+    total += 3 * padded[2:-2]
+    return np.asarray(total)
 
 
-def ridges(sharp: FloatArray, *, half_px: int = 3, flank_px: tuple[int, int] = (8, 16)) -> FloatArray:
+@numba.njit(cache=True, nogil=True)
+def _ridges(sharp, half, near, far, out):  # type: ignore[no-untyped-def]
+    cells, height = sharp.shape
+    total = np.zeros(height + 2 * far + 1)
+    for cell in range(cells):
+        for k in range(total.size - 1):
+            total[k + 1] = total[k] + sharp[cell, min(max(k - far, 0), height - 1)]
+        # row r lies at total[r + far + 1] − total[r + far]
+        ridge, below, above = total[far - half :], total, total[far + near :]
+        for row in range(height):
+            crest = (ridge[row + 2 * half + 1] - ridge[row]) / (2 * half + 1)
+            flanks = below[row + far - near + 1] - below[row] + above[row + far - near + 1] - above[row]
+            out[cell, row] = crest - 0.5 * flanks / (far - near + 1)
+
+
+def ridges(sharp: Float32Array, *, half_px: int = 3, flank_px: tuple[int, int] = (8, 16)) -> Float32Array:
     """Return how much sharper each place is than the rows on either side of it.
 
     Parameters
     ----------
-    sharp : float64 array, shape (cell, row)
+    sharp : float32 array, shape (cell, row)
     half_px : int
         Half width of a ridge.
     flank_px : (int, int)
@@ -74,16 +96,9 @@ def ridges(sharp: FloatArray, *, half_px: int = 3, flank_px: tuple[int, int] = (
 
     Returns
     -------
-    float64 array, same shape
+    float32 array, same shape
         Mean over the ridge minus mean over both flanks; rows beyond the picture repeat the outermost.
     """
-    near, far = flank_px
-    total = np.concatenate(
-        [np.zeros((sharp.shape[0], 1)), np.cumsum(np.pad(sharp, ((0, 0), (far, far)), mode="edge"), axis=1)], axis=1
-    )
-    rows = np.arange(sharp.shape[1]) + far
-
-    def mean(first: int, last: int) -> FloatArray:
-        return np.asarray((total[:, rows + last + 1] - total[:, rows + first]) / (last - first + 1))
-
-    return mean(-half_px, half_px) - 0.5 * (mean(-far, -near) + mean(near, far))
+    out = np.empty(sharp.shape, np.float32)
+    _ridges(sharp, half_px, *flank_px, out)
+    return out

@@ -39,9 +39,13 @@ class Tone:
         """Return how grey levels are seen, float32 array of the same shape; levels below 0 count as 0."""
         if self.compression == 0:
             return grey
-        contrast = np.maximum(grey, 0) / np.float32(self.level) - 1
-        seen = np.float32(self.level / self.compression) * np.log1p(np.float32(self.compression) * contrast)
-        return np.asarray(seen, np.float32)
+        # 1 + q (x/m − 1) is never below 1 − q, so its logarithm needs no care near 0
+        seen = np.maximum(grey, np.float32(0))
+        seen *= np.float32(self.compression / self.level)
+        seen += np.float32(1 - self.compression)
+        np.log(seen, out=seen)
+        seen *= np.float32(self.level / self.compression)
+        return seen
 
 
 def mean_level(pictures: list[Float32Array]) -> float:
