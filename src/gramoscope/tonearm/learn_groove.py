@@ -18,7 +18,8 @@ from scipy import optimize
 from gramoscope.conventions import FloatArray
 from gramoscope.tonearm.groove_prior import GroovePrior, start, taylor
 from gramoscope.tonearm.level import LEAST_SAMPLES, OneDirection, slope_power
-from gramoscope.tonearm.linear_gaussian import Gate, Moves, Readings, blank, forward
+from gramoscope.tonearm.linear_gaussian import Readings
+from gramoscope.tonearm.steady_likelihood import steady_log_likelihood
 
 GATE = 4.0
 """Samples further than this many standard errors from their prediction count as if they lay right there."""
@@ -158,11 +159,11 @@ def _log_likelihood(lessons: Sequence[Lesson], step_m: float, prior: GroovePrior
     at_rest, bend = prior.at_rest(step_m), prior.bend(step_m)
     total = 0.0
     for one in lessons:
-        sigma = prior.bends(one.level) / bend
-        bins = int(one.readings.bin[-1]) + 1
-        moves = Moves(a[None, None], sigma**2 * q[None, None], np.zeros(bins, np.int64), np.ones(bins))
+        sigma, read = prior.bends(one.level) / bend, one.readings
         covariance = start(at_rest, sigma, place_sigma_m=ANYWHERE_M)
-        total += forward(moves, one.readings, blank(covariance), gate=Gate(GATE)).log_likelihood
+        total += steady_log_likelihood(
+            a, sigma**2 * q, covariance, read.bin, read.value, read.variance, read.h[0], gate=GATE
+        )
     return total
 
 
