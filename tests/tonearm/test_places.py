@@ -162,8 +162,11 @@ def test_a_third_of_the_samples_may_be_wild(bench: Any, amplitude_m: float) -> N
     # where half of a neighbourhood happens to agree on something else, nobody could tell
     assert np.median(worse) < 4
     assert np.max(np.mean(wrong, axis=0)) < 0.01
-    # with a third of the samples gone more of the breath drowns, and the claim has room for more than there is
-    assert np.all(np.abs(np.mean(ratios, axis=0) - 1.1) < 0.3)
+    # with a third of the samples gone more of the breath drowns, and the claim has room for more than there is,
+    # of the soft voice above all
+    lateral_ratio, vertical_ratio = np.mean(ratios, axis=0)
+    assert 0.8 < lateral_ratio < 1.4
+    assert 0.8 < vertical_ratio < 1.6
     # both walls wild in three neighbouring samples
     assert ((heard.flags & Quality.OUTLIER) != 0).any()
 

@@ -63,7 +63,7 @@ class PlaceSmoother:
     gate: float = 5.0
     corner_limits_hz: tuple[float, float] = (300.0, 20_000.0)
     cutoff_limits_hz: tuple[float, float] = (2_000.0, 60_000.0)
-    width_limits_hz: tuple[float, float] = (5_000.0, 12_000.0)
+    width_limits_hz: tuple[float, float] = (6_000.0, 15_000.0)
     floor_m_s: float = 3e-4
     other_floor_m_s: float = 2e-4
 
