@@ -9,13 +9,13 @@ from gramoscope.pickup.texture.tone import Tone, mean_level
 GREY = np.linspace(0, 255, 511).astype(np.float32)
 
 
-@pytest.mark.parametrize("compression", [0.0, 1e-3, 0.5, 0.9, 0.99])
+@pytest.mark.parametrize("compression", [0.0, 0.01, 0.5, 0.9, 0.99])
 @pytest.mark.parametrize("level", [0.01, 3.0, 120.0])
 def test_about_the_mean_level_contrasts_stay_as_they_are(level: float, compression: float) -> None:
     tone = Tone(level, compression)
     step = 0.01 * level
     below, at, above = tone(np.array([level - step, level, level + step], np.float32)) - tone(np.float32([level]))
-    assert at == 0
+    assert abs(at) < 1e-4 * step
     assert (above - below) / (2 * step) == pytest.approx(1, rel=1e-3)
 
 

@@ -97,7 +97,8 @@ class Learning:
         require(self.folds >= 2, f"{self.folds} folds", "2 or more")
         require(len(self.loading) >= 1, "no rounds", "at least one loading")
         require(len(self.compressions) >= 1, "no tone", "at least one compression; 0 leaves pictures as they are")
-        require(all(0 <= q < 1 for q in self.compressions), f"compressions {self.compressions}", "0 … below 1")
+        for compression in self.compressions:
+            Tone(compression=compression)
         require(0 < self.band_low < self.band_high <= 0.5, f"a band of {self.band_low} … {self.band_high}", "0 … 0.5")
 
     @property

@@ -164,7 +164,7 @@ class Rules:
 
     power_limits: tuple[float, float] = (0.2, 4.0)
     least_support: float = 0.15
-    smooth_px: float = 10.0
+    smooth_px: float = 12.0
     step_noise_px: float = 0.08
     smooth_other_px: float = 200.0
     largest_step_px: float = 1.0

@@ -15,6 +15,9 @@ import numpy as np
 from gramoscope.conventions import Float32Array, FloatArray
 from gramoscope.errors import require
 
+LEAST_COMPRESSION = 0.01
+"""Weaker ones would be lost in single precision."""
+
 
 @dataclass(frozen=True)
 class Tone:
@@ -25,7 +28,7 @@ class Tone:
     level : float
         Mean grey level m of the passage, positive.
     compression : float
-        q, 0 … below 1: grey x is seen as (m/q) log(1 + q (x/m − 1)). 0 leaves pictures as they are.
+        q, 0 or 0.01 … below 1: grey x is seen as (m/q) log(1 + q (x/m − 1)). 0 leaves pictures as they are.
     """
 
     level: float = 1.0
@@ -33,13 +36,14 @@ class Tone:
 
     def __post_init__(self) -> None:
         require(self.level > 0, f"a mean level of {self.level}", "a positive one")
-        require(0 <= self.compression < 1, f"a compression of {self.compression}", "0 … below 1")
+        possible = self.compression == 0 or LEAST_COMPRESSION <= self.compression < 1
+        require(possible, f"a compression of {self.compression}", f"0, or {LEAST_COMPRESSION} … below 1")
 
     def __call__(self, grey: Float32Array) -> Float32Array:
         """Return how grey levels are seen, float32 array of the same shape; levels below 0 count as 0."""
         if self.compression == 0:
             return grey
-        # 1 + q (x/m − 1) is never below 1 − q, so its logarithm needs no care near 0
+        # as a logarithm of 1 − q + q x/m it is four times as quick as one near 1
         seen = np.maximum(grey, np.float32(0))
         seen *= np.float32(self.compression / self.level)
         seen += np.float32(1 - self.compression)
