@@ -1,6 +1,6 @@
 """How fast is the recipe `best`, from frames in memory to velocities, stage by stage?
 
-    python -m benchmarks.speed.reading [--groups 32] [--table benchmarks/speed/reading.md]
+    python -m benchmarks.speed.reading [--groups 128] [--table benchmarks/speed/reading.md]
 
 Films a melody with the simulator (12 frames of 1280 × 512 a group), lets the cartridge learn, and times each stage on one
 thread, then the whole on one and on two. Bytes and shares are those of the roofline (`ceilings`), measured in the same run.
@@ -21,10 +21,11 @@ import numpy as np
 from benchmarks.accuracy.table import line_of
 from benchmarks.speed.ceilings import Ceilings, measured_ceilings, seconds
 from gramoscope.apparatus.capture import Capture, open_capture
+from gramoscope.camera.exposure import EVERY_ROW
 from gramoscope.disc.formats import direction_of_cut
 from gramoscope.pickup.overlay import overlay
 from gramoscope.pickup.registration import frame_shifts
-from gramoscope.pickup.texture.reading import evidence
+from gramoscope.pickup.texture.reading import evidence, step
 from gramoscope.pickup.texture.sharpness import sharpness
 from gramoscope.pickup.texture_likelihood import TexturePickup, laid_out, samples_of
 from gramoscope.player.play import learned
@@ -57,25 +58,27 @@ def reading_stages(pickup: TexturePickup, group: FrameGroup) -> list[Row]:
     laid = overlay(group.images, shift, index)
     columns, usable, burnt = laid_out(laid, group.white_level)
     cartridge = pickup.cartridge
-    cut = cartridge.bench.disc.cut
+    cut, rules = cartridge.bench.disc.cut, cartridge.rules
     sharp = sharpness(columns)
-    stretch = pickup.stretch(columns, usable, burnt)
     model = pickup.lessons[-1].whole
-    seen = stretch.in_tone(model.tone)
-    found = evidence(seen, model, cartridge.rules)
-    rounds = len(pickup.lessons) + 1
+    seen = pickup.stretch(columns, usable, burnt).in_tone(model.tone)
+    found = evidence(seen, model, rules)
+
+    def rounds() -> None:
+        for _ in range(cartridge.rounds):
+            step(evidence(seen, model, rules, judged=False), cut, rules)
+        evidence(seen, model, rules)
+
     return [
+        ("frames that show nothing", seconds(lambda: cartridge.exposure.sort_out(group)), film / EVERY_ROW),
         ("how far the record turned", seconds(lambda: frame_shifts(group)), 0.0),
         ("frames laid over each other", seconds(lambda: overlay(group.images, shift, index)), film),
         ("sharpness", seconds(lambda: sharpness(columns)), 0.0),
         ("coarse search", seconds(lambda: cartridge.search.find(sharp, pickup.layout, cut=cut)), 0.0),
         ("tone", seconds(lambda: model.tone(columns)), 0.0),
-        (
-            f"likelihood, {rounds} rounds",
-            rounds * seconds(lambda: evidence(seen, model, cartridge.rules)),
-            0.0,
-        ),
+        (f"likelihood, {cartridge.rounds} rounds and what they come to", seconds(rounds), 0.0),
         ("samples", seconds(lambda: samples_of(seen, found)), 0.0),
+        ("strips for the splice", seconds(lambda: pickup.strips(laid, group)), 0.0),
         ("reading, one thread, whole", seconds(lambda: pickup.read(group)), film),
     ]
 
@@ -161,7 +164,7 @@ def page(rows: list[Row], capture: Capture, pixels: int, ceilings: Ceilings) -> 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--groups", type=int, default=32)
+    parser.add_argument("--groups", type=int, default=128)
     parser.add_argument("--table", type=Path, help="page to write")
     given = parser.parse_args()
     rows, capture, pixels = measured_rows(given.groups)

@@ -29,7 +29,7 @@ from gramoscope.pickup.texture.learning import Learning, Lesson
 from gramoscope.pickup.texture.reading import Evidence, Rules, Stretch, read, settled, spaced
 from gramoscope.pickup.texture.sharpness import CELL_PX, sharpness
 from gramoscope.quality import Quality, no_flags
-from gramoscope.signal_path import FrameGroup, WallTrace
+from gramoscope.signal_path import FrameGroup, Texture, WallTrace
 
 STRIDE_PX = 8
 """Columns whose evidence makes one sample."""
@@ -176,14 +176,18 @@ class TexturePickup:
             return self._lost(group, exposure_flags, (*group.problems, f"group {group.number} is not read: {UNTAUGHT}"))
         laid, step_m = overlaid(group)
         stretch, found = self._read(laid, group)
-        head, tail = overlap_textures(
+        head, tail = self.strips(laid, group)
+        return replace(self._trace(group, stretch, found, exposure_flags, step_m), head=head, tail=tail)
+
+    def strips(self, laid: Overlay, group: FrameGroup) -> tuple[Texture | None, Texture | None]:
+        """Return the texture at both ends of a group's mean, by which it is matched with its neighbours."""
+        return overlap_textures(
             group,
             first=int(laid.frame_index[0]),
             width=laid.columns.shape[0],
             group_step_m=self.cartridge.bench.sequence.group_step_m,
             texture_of=lambda columns: ndimage.gaussian_filter(laid.columns[columns].T, 1.0, order=(0, 1)),
         )
-        return replace(self._trace(group, stretch, found, exposure_flags, step_m), head=head, tail=tail)
 
     @property
     def taught(self) -> bool:

@@ -31,7 +31,12 @@ def displacement_px(number: int) -> FloatArray:
     return np.array([lateral - drift, lateral + drift])
 
 
-def picture(number: int) -> np.ndarray:
+def treble_px(period_px: float) -> FloatArray:
+    """How both walls of a lateral cut move that is heard, too."""
+    return np.tile(0.5 * np.sin(2 * np.pi * np.arange(WIDTH) / period_px + 0.7), (2, 1))
+
+
+def picture(number: int, path_px: FloatArray) -> np.ndarray:
     """What the camera sees of it, columns first, in grey levels."""
     rng = np.random.default_rng([number, 2])
     row = np.arange(HEIGHT)
@@ -40,17 +45,17 @@ def picture(number: int) -> np.ndarray:
     blur = np.exp(-2 * (np.pi * np.fft.rfftfreq(1024) * np.hypot(0.7, 0.35 * away)[:, None]) ** 2)
     straight = fft.irfft(fft.rfft(grains) * blur, 1024)[:, :WIDTH]
     wall = np.where(row < LAYOUT.middle_row, OUTER, INNER)
-    place = row[:, None] - displacement_px(number)[wall]
+    place = row[:, None] - path_px[wall]
     bent = ndimage.map_coordinates(straight, (place, np.broadcast_to(np.arange(WIDTH), place.shape)), order=5)
     return np.ascontiguousarray((100 + 40 * bent + rng.normal(size=bent.shape)).T, np.float32)
 
 
-def stretch(number: int, error_px: float = 0.6) -> Stretch:
-    """The stretch laid ready, its path wrong as a coarse search leaves it."""
+def stretch(number: int, sound_px: FloatArray | float = 0.0, error_px: float = 0.6) -> Stretch:
+    """The stretch laid ready, its path wrong as a coarse search leaves it, and without the sound."""
     rng = np.random.default_rng([number, 3])
     wrong = ndimage.gaussian_filter1d(rng.normal(size=WIDTH), 40) * error_px * np.sqrt(2 * np.sqrt(np.pi) * 40)
     return Stretch(
-        picture(number),
+        picture(number, displacement_px(number) + sound_px),
         np.ones(WIDTH, bool),
         np.zeros((WIDTH, HEIGHT), bool),
         displacement_px(number) + wrong,
@@ -77,3 +82,9 @@ def stretches() -> list[Stretch]:
 def another() -> Stretch:
     """Number 77, that nobody learns from."""
     return stretch(77)
+
+
+@pytest.fixture(scope="session")
+def with_treble() -> Callable[[float], tuple[Stretch, FloatArray]]:
+    """Number 78 with a tone of a given period, and that tone."""
+    return lambda period_px: (stretch(78, treble_px(period_px)), treble_px(period_px))

@@ -11,6 +11,7 @@ import pytest
 from gramoscope.apparatus.bench import Bench
 from gramoscope.conventions import INNER, OUTER, FloatArray
 from gramoscope.pickup.texture.calibration import aligned_layout, calibration_of
+from gramoscope.pickup.texture.filter_bank import FilterBank
 from gramoscope.pickup.texture.groove_search import GrooveSearch
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.likelihood import StripeStatistics
@@ -80,8 +81,8 @@ def test_pictures_that_show_nothing_leave_the_layout_as_the_manifest_has_it() ->
 
 
 def _model(layout: StripeLayout) -> Model:
-    matrix, share = np.zeros((1, 3, 3), np.float32), np.array([1.0, 0.0])
-    one = StripeStatistics(matrix, matrix, np.zeros(1, np.float32), share, 4.0, 8.0, 0.0, np.ones(3), 9000)
+    deaf = FilterBank(*(np.zeros(shape, np.float32) for shape in ((19, 3), (1, 2, 3), (2,), (3, 3))))
+    one = StripeStatistics(deaf, 4.0, 8.0, 0.0, np.ones(19), 9000)
     return Model(layout, Tone(), np.ones(1), 1, Band(), 64, (None, one, one, one))
 
 

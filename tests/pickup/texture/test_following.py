@@ -4,7 +4,19 @@ import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
 
-from gramoscope.pickup.texture.following import GENTLE, REACH, SHARP, across, follow, interpolation_taps
+from gramoscope.conventions import FloatArray
+from gramoscope.pickup.texture.following import (
+    BLOCK,
+    GENTLE,
+    REACH,
+    SHARP,
+    across,
+    channels,
+    follow,
+    interpolation_taps,
+    shifted,
+    wide_rows,
+)
 
 HALF_PX = 9
 WAVES = np.random.default_rng(4).uniform((0.03, 0.01, -3), (0.22, 0.2, 3), (12, 3))
@@ -18,9 +30,15 @@ def _value(column: np.ndarray, row: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def _seen(picture: np.ndarray, path: np.ndarray, half_px: int) -> tuple[np.ndarray, np.ndarray]:
-    """Window and derivative."""
-    wide = follow(picture, path, half_px)
-    return wide[REACH:-REACH], across(wide, GENTLE)
+    """Window and derivative, rows first."""
+    wide = follow(picture, path, half_px).T
+    return wide[REACH:-REACH], _derivative(wide, GENTLE)
+
+
+def _derivative(rows: np.ndarray, slope: FloatArray) -> np.ndarray:
+    """Of all rows but the outermost eight, shape (row, column)."""
+    more = REACH - slope.size
+    return np.asarray(across(len(rows) - 2 * REACH, slope) @ rows[more : len(rows) - more])
 
 
 @pytest.fixture
@@ -88,24 +106,59 @@ def test_the_picture_stays_as_it_was(picture: np.ndarray, path: np.ndarray) -> N
     np.testing.assert_array_equal(picture, before)
 
 
+@pytest.mark.parametrize("half_px", [1, 4, 9, 12])
+@pytest.mark.parametrize("width", [1, BLOCK - 1, BLOCK, BLOCK + 22])
+def test_a_window_of_any_size_has_eight_rows_more_on_each_side(
+    picture: np.ndarray, path: np.ndarray, half_px: int, width: int
+) -> None:
+    found = follow(picture[:width], path[:width], half_px)
+    assert found.shape == (width, wide_rows(half_px)) == (width, 2 * half_px + 17)
+    assert found.dtype == np.float32
+    more = follow(picture, path, half_px + 3)
+    np.testing.assert_allclose(found, more[:width, 3:-3], atol=1e-6)
+
+
+@pytest.mark.parametrize("half_px", [4, HALF_PX])
+@pytest.mark.parametrize("width", [BLOCK, BLOCK + 22])
+def test_channels_are_weighted_sums_of_the_rows(
+    picture: np.ndarray, path: np.ndarray, half_px: int, width: int
+) -> None:
+    basis = np.random.default_rng(3).normal(size=(wide_rows(half_px), 5)).astype(np.float32)
+    found = channels(picture[:width], path[:width], half_px, basis)
+    direct = follow(picture[:width], path[:width], half_px).astype(np.float64) @ basis
+    assert found.shape == (width, 5)
+    np.testing.assert_allclose(found, direct, atol=1e-5 * np.abs(direct).max())
+
+
+@pytest.mark.parametrize("px", [-383 / 512, -0.25, 0.0, 0.3125, 511 / 512])
+def test_a_window_is_shifted_as_if_the_path_had_been(picture: np.ndarray, px: float) -> None:
+    # on whole rows, for what lies between rows is interpolated once only
+    path = np.round(np.linspace(40, 71, 150))
+    wide = follow(picture, path, HALF_PX)
+    rows = wide.shape[1] - 10
+    moved = follow(picture, path + px, HALF_PX)[:, 5:-5]
+    assert shifted(rows, px).shape == (rows, rows + 10)
+    np.testing.assert_allclose(wide @ shifted(rows, px).T, moved, atol=1e-5)
+
+
 @pytest.mark.parametrize("degree", range(7))
 def test_across_is_exact_for_polynomials_up_to_the_sixth_degree(degree: int) -> None:
     row = np.linspace(-1.2, 0.9, 24)
-    derivative = across(np.stack([row**degree, -3 * row**degree], axis=1).astype(np.float32), GENTLE)
+    derivative = _derivative(np.stack([row**degree, -3 * row**degree], axis=1), GENTLE)
     exact = degree * row[REACH:-REACH] ** max(degree - 1, 0) * (row[1] - row[0])
-    np.testing.assert_allclose(derivative, np.stack([exact, -3 * exact], axis=1), atol=3e-6)
+    np.testing.assert_allclose(derivative, np.stack([exact, -3 * exact], axis=1), atol=1e-12)
 
 
 def test_across_is_not_exact_for_the_seventh() -> None:
     row = np.arange(24.0) - 11
-    derivative = across((row**7)[:, None].astype(np.float32), GENTLE)[:, 0]
+    derivative = _derivative((row**7)[:, None], GENTLE)[:, 0]
     assert np.abs(derivative - 7 * row[REACH:-REACH] ** 6).max() > 1
 
 
 @pytest.mark.parametrize("slope", [GENTLE, SHARP])
 def test_across_is_exact_for_a_straight_line(slope: np.ndarray) -> None:
-    line = np.outer(np.arange(20.0), [0.0, 1.0, -2.5]) + 4
-    np.testing.assert_allclose(across(line.astype(np.float32), slope), np.tile([0.0, 1.0, -2.5], (6, 1)), atol=1e-5)
+    line = np.outer(np.arange(6.0 + 2 * slope.size), [0.0, 1.0, -2.5]) + 4
+    np.testing.assert_allclose(across(6, slope) @ line, np.tile([0.0, 1.0, -2.5], (6, 1)), atol=1e-12)
 
 
 def _share_kept(slope: np.ndarray, frequency: float) -> np.ndarray:
@@ -113,7 +166,7 @@ def _share_kept(slope: np.ndarray, frequency: float) -> np.ndarray:
     row = np.arange(200.0)
     turn = 2 * np.pi * frequency
     true = -turn * np.sin(turn * row[REACH:-REACH])
-    found = across(np.cos(turn * row)[:, None].astype(np.float32), slope)[:, 0]
+    found = _derivative(np.cos(turn * row)[:, None], slope)[:, 0]
     return np.asarray((found / true)[np.abs(true) > 0.5 * turn])
 
 

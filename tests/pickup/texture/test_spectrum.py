@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import fft
 
+from gramoscope.errors import ArgumentError
 from gramoscope.pickup.texture.likelihood import softened
 from gramoscope.pickup.texture.spectrum import (
     Band,
@@ -20,9 +21,8 @@ BAND = Band()
 LENGTH = 1024
 WIDTH = 700
 LAG_PX = 80
+SMOOTH_BINS = 16.0
 # symmetric, as a groove has no preferred direction: the cross-spectra are real
-SLOPE = np.array([[0.0, 0.7, -0.2], [-0.5, 0.0, 0.5], [0.3, -1.1, 0.4]], np.float32)
-"""By which the rows make their own derivative."""
 FILTERS = np.array([[0.1, 0.5, 1.0, 0.5, 0.1], [-0.3, 0.2, 0.8, 0.2, -0.3], [0.0, -0.4, 0.9, -0.4, 0.0]])
 
 
@@ -35,7 +35,7 @@ def _true_spectra(length: int) -> np.ndarray:
 def _rows(rng: np.random.Generator, width: int = WIDTH) -> np.ndarray:
     noise = rng.normal(size=width + 4)
     rows = np.array([np.convolve(noise, taps, mode="valid") for taps in FILTERS])
-    return (rows + np.sqrt(0.1) * rng.normal(size=rows.shape)).astype(np.float32)
+    return np.ascontiguousarray((rows + np.sqrt(0.1) * rng.normal(size=rows.shape)).T, np.float32)
 
 
 def _weight(rng: np.random.Generator, width: int = WIDTH) -> np.ndarray:
@@ -49,15 +49,12 @@ def _weight(rng: np.random.Generator, width: int = WIDTH) -> np.ndarray:
 def _summed(rng: np.random.Generator, windows: int) -> CrossSpectra:
     total = CrossSpectra(3, LENGTH)
     for _ in range(windows):
-        rows = _rows(rng)
-        total.add(cross_spectra(rows, SLOPE @ rows, _weight(rng), length=LENGTH))
+        total.add(cross_spectra(_rows(rng), _weight(rng), length=LENGTH))
     return total
 
 
 def test_known_cross_spectra_are_found_without_bias_whatever_is_missing() -> None:
-    found, _ = _summed(np.random.default_rng(8), 300).spectra(
-        largest_lag_px=LAG_PX, change_lag_px=LAG_PX, length=LENGTH
-    )
+    found = _summed(np.random.default_rng(8), 300).spectra(largest_lag_px=LAG_PX, length=LENGTH)
     true = _true_spectra(LENGTH)
     scale = np.sqrt(np.einsum("fi,fj->fij", *(2 * [np.diagonal(true, axis1=1, axis2=2)])))
     error = (found - true) / scale
@@ -67,24 +64,19 @@ def test_known_cross_spectra_are_found_without_bias_whatever_is_missing() -> Non
     np.testing.assert_array_equal(found, found.transpose(0, 2, 1))
 
 
-def test_the_change_of_rows_that_make_their_own_derivative_follows_from_their_spectra() -> None:
-    found, change = _summed(np.random.default_rng(8), 300).spectra(
-        largest_lag_px=LAG_PX, change_lag_px=LAG_PX, length=LENGTH
-    )
-    np.testing.assert_allclose(change, SLOPE @ found + found @ SLOPE.T, atol=1e-6 * np.abs(change).max())
-    true = SLOPE @ _true_spectra(LENGTH)
-    error = change - true - true.transpose(0, 2, 1)
-    assert np.abs(error.mean(axis=0)).max() < 0.006 * np.abs(true).max()
-    assert error.std() < 0.035 * np.abs(true).max()
+def test_the_covariance_of_a_column_is_found_whatever_is_missing() -> None:
+    total = _summed(np.random.default_rng(8), 300)
+    true = FILTERS @ FILTERS.T + 0.1 * np.eye(3)
+    np.testing.assert_allclose(total.covariance, true, atol=0.02 * np.diag(true).max())
 
 
-def test_the_change_is_what_a_small_move_does_to_the_spectra() -> None:
-    rng = np.random.default_rng(7)
-    rows, derivative, weight = _rows(rng), _rows(rng), _weight(rng)
-    lower, here, higher = (
-        cross_spectra(rows + move * derivative, derivative, weight, length=LENGTH) for move in (-0.1, 0.0, 0.1)
-    )
-    np.testing.assert_allclose(here.change, (higher.within - lower.within) / 0.2, atol=1e-4 * np.abs(here.change).max())
+def test_columns_are_counted_by_the_square_of_their_weight() -> None:
+    rng, total, count = np.random.default_rng(8), CrossSpectra(3, LENGTH), 0.0
+    for _ in range(3):
+        weight = 0.7 * _weight(rng)
+        count += float((weight.astype(np.float64) ** 2).sum())
+        total.add(cross_spectra(_rows(rng), weight, length=LENGTH))
+    assert total.columns == pytest.approx(count, rel=1e-6)
 
 
 def test_the_error_falls_as_the_root_of_the_columns() -> None:
@@ -93,7 +85,7 @@ def test_the_error_falls_as_the_root_of_the_columns() -> None:
     few, many = (
         np.mean(
             [
-                (_summed(rng, n).spectra(largest_lag_px=LAG_PX, change_lag_px=LAG_PX, length=LENGTH)[0] - true).std()
+                (_summed(rng, n).spectra(largest_lag_px=LAG_PX, length=LENGTH) - true).std()
                 for _ in range(6)
             ]
         )
@@ -104,22 +96,24 @@ def test_the_error_falls_as_the_root_of_the_columns() -> None:
 
 def test_the_answer_comes_in_the_bins_of_any_transform() -> None:
     total = _summed(np.random.default_rng(2), 20)
-    fine, coarse = (total.spectra(largest_lag_px=LAG_PX, change_lag_px=LAG_PX, length=n) for n in (1024, 256))
-    for every, fourth in zip(fine, coarse, strict=True):
-        np.testing.assert_allclose(every[::4], fourth, atol=1e-6 * np.abs(fourth).max())
+    fine, coarse = (total.spectra(largest_lag_px=LAG_PX, length=n) for n in (1024, 256))
+    np.testing.assert_allclose(fine[::4], coarse, atol=1e-6 * np.abs(coarse).max())
+
+
+def test_a_transform_that_cannot_hold_all_lags_is_refused() -> None:
+    total = _summed(np.random.default_rng(2), 1)
+    assert np.isfinite(total.spectra(largest_lag_px=LAG_PX, length=2 * LAG_PX + 1)).all()
+    with pytest.raises(ArgumentError, match="160 for lags up to 80"):
+        total.spectra(largest_lag_px=LAG_PX, length=2 * LAG_PX)
 
 
 @pytest.mark.parametrize(("lag", "share"), [(0, 1.0), (20, 1.0), (40, 1.0), (60, 0.5), (80, 0.0), (100, 0.0)])
 def test_lags_count_fully_up_to_half_the_window_and_not_beyond_it(lag: int, share: float) -> None:
-    rows = np.zeros((1, WIDTH), np.float32)
-    rows[0, [200, 200 + lag]] = 1.0
+    rows = np.zeros((WIDTH, 1), np.float32)
+    rows[[200, 200 + lag]] = 1.0
     weight = np.ones(WIDTH, np.float32)
-    found = cross_spectra(rows, 3 * rows, weight, length=LENGTH).spectra(
-        largest_lag_px=LAG_PX, change_lag_px=LAG_PX, length=LENGTH
-    )
-    within, change = (fft.irfft(spectra[:, 0, 0], LENGTH)[lag] * (WIDTH - lag) for spectra in found)
-    assert within == pytest.approx(share, abs=0.04)
-    assert change == pytest.approx(6 * share, abs=0.24)
+    found = cross_spectra(rows, weight, length=LENGTH).spectra(largest_lag_px=LAG_PX, length=LENGTH)
+    assert fft.irfft(found[:, 0, 0], LENGTH)[lag] * (WIDTH - lag) == pytest.approx(share, abs=0.04)
 
 
 def _power_laws() -> dict[str, Callable[[np.ndarray], np.ndarray]]:
@@ -145,13 +139,19 @@ def test_a_whitened_spectrum_is_flat_in_the_band_and_nothing_outside(law: str) -
     assert (white_db[frequency > 0.45] < white_db[inside].mean() - 15).all()
 
 
-def test_filtering_moves_nothing_and_mirrors_what_lies_outside() -> None:
+@pytest.mark.parametrize("beyond", [0, 1, 2, 19, 20])
+@pytest.mark.parametrize("count", [1, 4, 33, 1100])
+def test_filtering_moves_nothing_and_mirrors_what_lies_outside(count: int, beyond: int) -> None:
     rng = np.random.default_rng(3)
-    rows, half = rng.normal(size=(4, 333)).astype(np.float32), rng.normal(size=21)
+    rows, half = rng.normal(size=(333, count)).astype(np.float32), rng.normal(size=beyond + 1)
+    before = rows.copy()
     taps = np.concatenate([half[:0:-1], half])
-    mirrored = np.concatenate([rows[:, 19::-1], rows, rows[:, :-21:-1]], axis=1)
-    direct = np.array([np.convolve(row, taps, mode="valid") for row in mirrored])
-    np.testing.assert_allclose(filtered(rows, taps), direct, atol=3e-5)
+    mirrored = np.concatenate([rows[:beyond][::-1], rows, rows[len(rows) - beyond :][::-1]])
+    direct = np.array([np.convolve(row, taps, mode="valid") for row in mirrored.T]).T
+    found = filtered(rows, taps)
+    assert found.dtype == np.float32
+    np.testing.assert_allclose(found, direct, atol=3e-5)
+    np.testing.assert_array_equal(rows, before)
 
 
 def _covariance(values: np.ndarray, seed: int = 1) -> np.ndarray:
@@ -161,16 +161,16 @@ def _covariance(values: np.ndarray, seed: int = 1) -> np.ndarray:
 
 def test_the_precision_of_a_safe_matrix_is_its_inverse() -> None:
     c = _covariance(np.array([2.0, 2.0, 2.0, 3.0, 50.0, 7.0, 11.0, 4.0, 900.0]))
-    inverse, noise = precision(c, band=slice(5, 30), loading=0.0)
+    inverse, noise = precision(c, band=slice(5, 30), loading=0.0, smooth_bins=SMOOTH_BINS)
     assert inverse.shape == (25, 9, 9)
     np.testing.assert_allclose(inverse @ c[5:30], np.broadcast_to(np.eye(9), (25, 9, 9)), atol=1e-3)
     np.testing.assert_allclose(noise, 2.0, rtol=1e-5)
 
 
 def test_what_the_sample_could_not_tell_is_never_below_the_noise() -> None:
-    inverse, noise = precision(_covariance(np.array([1e-9, 0.0, 6.0, 7.0, 8.0, 9.0])), band=slice(0, 40), loading=0.0)
+    inverse, noise = precision(_covariance(np.array([1e-9, 0.0, 6.0, 7.0, 8.0, 9.0])), band=slice(0, 40), loading=0.0, smooth_bins=SMOOTH_BINS)
     assert np.linalg.eigvalsh(inverse)[:, -1] == pytest.approx(1 / noise[0], rel=1e-3)
-    lucky, noise = precision(_covariance(np.array([0.1, 1.9, 6.0, 7.0, 8.0, 9.0])), band=slice(0, 40), loading=0.0)
+    lucky, noise = precision(_covariance(np.array([0.1, 1.9, 6.0, 7.0, 8.0, 9.0])), band=slice(0, 40), loading=0.0, smooth_bins=SMOOTH_BINS)
     assert noise == pytest.approx(1.0, rel=1e-5)
     assert np.linalg.eigvalsh(lucky)[:, -1] == pytest.approx(1.0, rel=1e-4)
 
@@ -178,13 +178,13 @@ def test_what_the_sample_could_not_tell_is_never_below_the_noise() -> None:
 def test_a_single_unlucky_bin_leans_on_its_neighbours() -> None:
     c = _covariance(np.array([1.0, 1.0, 3.0, 4.0, 5.0, 6.0])).copy()
     c[20] = _covariance(np.array([1e-6, 1e-6, 3.0, 4.0, 5.0, 6.0]))[0]
-    inverse, _ = precision(c, band=slice(0, 40), loading=0.0)
+    inverse, _ = precision(c, band=slice(0, 40), loading=0.0, smooth_bins=SMOOTH_BINS)
     assert np.linalg.eigvalsh(inverse[20])[-1] < 1.1
 
 
 def test_loading_adds_a_share_of_the_mean_power_to_every_direction() -> None:
     values = np.array([1.0, 1.0, 1.0, 5.0, 12.0, 40.0])
-    inverse, _ = precision(_covariance(values), band=slice(0, 40), loading=0.3)
+    inverse, _ = precision(_covariance(values), band=slice(0, 40), loading=0.3, smooth_bins=SMOOTH_BINS)
     np.testing.assert_allclose(np.sort(1 / np.linalg.eigvalsh(inverse[7])), values + 0.3 * 10, rtol=1e-4)
 
 
@@ -195,10 +195,10 @@ def test_the_band_is_in_cycles_a_pixel() -> None:
 @pytest.mark.parametrize("width", [1, 7, 25])
 def test_rows_shorter_than_the_filter_repeat_their_other_end(width: int) -> None:
     rng = np.random.default_rng(5)
-    rows, half = rng.normal(size=(2, width)).astype(np.float32), rng.normal(size=21)
+    rows, half = rng.normal(size=(width, 2)).astype(np.float32), rng.normal(size=21)
     place = np.minimum(np.arange(20), width - 1)
-    beyond = np.concatenate([rows[:, place[::-1]], rows, rows[:, width - 1 - place]], axis=1)
+    beyond = np.concatenate([rows[place[::-1]], rows, rows[width - 1 - place]])
     taps = np.concatenate([half[:0:-1], half])
     np.testing.assert_allclose(
-        filtered(rows, taps), [np.convolve(one, taps, mode="valid") for one in beyond], atol=3e-5
+        filtered(rows, taps).T, [np.convolve(one, taps, mode="valid") for one in beyond.T], atol=3e-5
     )
