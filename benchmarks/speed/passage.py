@@ -1,0 +1,122 @@
+"""Does twice the passage take twice the time, in the same memory, from files to files?
+
+    python -m benchmarks.speed.passage [--groups 128,256,512] [--table benchmarks/speed/passage.md]
+
+Films 64 groups (12 frames of 1280 × 512) and strings them together over and over by links, so that a long passage needs no more
+disk than a short one; each length is then played by the recipe `best`, every time in a process of its own. The joints make
+no music, but neither time nor memory depends on that.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import os
+import re
+import resource
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.speed.reading import filmed_capture
+from gramoscope.apparatus.capture import open_capture
+from gramoscope.player.play import Settings, play
+from gramoscope.player.recipe import load_recipe
+
+FILMED = 64
+WORKERS = 2
+
+
+@dataclass(frozen=True)
+class Played:
+    """How one passage went."""
+
+    groups: int
+    learning_s: float
+    playing_s: float
+    peak_mib: float
+    real_time_factor: float
+
+
+def strung_together(film: Path, folder: Path, groups: int) -> Path:
+    """Make a capture of so many groups out of links to the frames of a shorter one."""
+    (folder / "frames").mkdir(parents=True)
+    for number in range(groups):
+        os.link(film / "frames" / f"g{number % FILMED:06d}.tif", folder / "frames" / f"g{number:06d}.tif")
+    manifest = (film / "capture.toml").read_text("utf-8")
+    manifest = re.sub(r"^groups = \d+$", f"groups = {groups}", manifest, flags=re.MULTILINE)
+    # places are nominal: the log is of the short film
+    manifest = re.sub(r"^log = .*\n", "", manifest, flags=re.MULTILINE)
+    (folder / "capture.toml").write_text(manifest, "utf-8")
+    return folder
+
+
+def played(folder: Path, out: Path) -> Played:
+    """Play a capture; meant to run in a process of its own."""
+    capture = open_capture(folder)
+    began: dict[str, float] = {}
+
+    def noted(_done: int, _total: int, what: str) -> None:
+        began.setdefault(what, time.perf_counter())
+
+    started = time.perf_counter()
+    play(capture, load_recipe("best"), out, Settings(workers=WORKERS), progress=noted)
+    playing = began["Playing"]
+    playing_s = time.perf_counter() - playing
+    sounding_s = float(capture.bench.rotation.time_of_arc_s(capture.bench.passage_length_m))
+    return Played(
+        capture.group_count,
+        playing - started,
+        playing_s,
+        resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        sounding_s / playing_s,
+    )
+
+
+def page(rows: list[Played]) -> str:
+    """Return the table."""
+    lines = [
+        "# Passages, short and long",
+        "",
+        "    python -m benchmarks.speed.passage --table benchmarks/speed/passage.md",
+        "",
+        f"`play` with the recipe `best` on {WORKERS} threads, from uncompressed TIFF (12 frames of 1280 × 512 a group) to sound "
+        "files, report and picture; learning takes its 64 groups however long the passage is.",
+        "*× the one before*: the passage is twice as long, so this should be 2.00.",
+        "",
+        "| groups | learning s | playing s | × the one before | ms a group | peak memory MiB | real-time factor of playing |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for before, row in zip([None, *rows], rows, strict=False):
+        times = f"{row.playing_s / before.playing_s:.2f}" if before else "–"
+        lines.append(
+            f"| {row.groups} | {row.learning_s:.1f} | {row.playing_s:.2f} | {times} | {row.playing_s / row.groups * 1e3:.1f} "
+            f"| {row.peak_mib:.0f} | {row.real_time_factor:.4f} |"
+        )
+    return "\n".join([*lines, ""])
+
+
+def main() -> int:
+    """Run the benchmark."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--groups", default="128,256,512", help="lengths, each twice the one before")
+    parser.add_argument("--table", type=Path, help="page to write")
+    given = parser.parse_args()
+    rows = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        filmed_capture(folder / "film", FILMED)
+        for groups in (int(n) for n in given.groups.split(",")):
+            capture = strung_together(folder / "film", folder / str(groups), groups)
+            with multiprocessing.get_context("spawn").Pool(1) as alone:
+                rows.append(alone.apply(played, (capture, folder / f"out{groups}")))
+            print(rows[-1], flush=True)
+    if given.table:
+        given.table.write_text(page(rows), "utf-8")
+    print(page(rows))
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
