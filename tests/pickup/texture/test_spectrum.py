@@ -83,12 +83,7 @@ def test_the_error_falls_as_the_root_of_the_columns() -> None:
     rng = np.random.default_rng(5)
     true = _true_spectra(LENGTH)
     few, many = (
-        np.mean(
-            [
-                (_summed(rng, n).spectra(largest_lag_px=LAG_PX, length=LENGTH) - true).std()
-                for _ in range(6)
-            ]
-        )
+        np.mean([(_summed(rng, n).spectra(largest_lag_px=LAG_PX, length=LENGTH) - true).std() for _ in range(6)])
         for n in (4, 64)
     )
     assert few / many == pytest.approx(4, rel=0.2)
@@ -168,9 +163,13 @@ def test_the_precision_of_a_safe_matrix_is_its_inverse() -> None:
 
 
 def test_what_the_sample_could_not_tell_is_never_below_the_noise() -> None:
-    inverse, noise = precision(_covariance(np.array([1e-9, 0.0, 6.0, 7.0, 8.0, 9.0])), band=slice(0, 40), loading=0.0, smooth_bins=SMOOTH_BINS)
+    inverse, noise = precision(
+        _covariance(np.array([1e-9, 0.0, 6.0, 7.0, 8.0, 9.0])), band=slice(0, 40), loading=0.0, smooth_bins=SMOOTH_BINS
+    )
     assert np.linalg.eigvalsh(inverse)[:, -1] == pytest.approx(1 / noise[0], rel=1e-3)
-    lucky, noise = precision(_covariance(np.array([0.1, 1.9, 6.0, 7.0, 8.0, 9.0])), band=slice(0, 40), loading=0.0, smooth_bins=SMOOTH_BINS)
+    lucky, noise = precision(
+        _covariance(np.array([0.1, 1.9, 6.0, 7.0, 8.0, 9.0])), band=slice(0, 40), loading=0.0, smooth_bins=SMOOTH_BINS
+    )
     assert noise == pytest.approx(1.0, rel=1e-5)
     assert np.linalg.eigvalsh(lucky)[:, -1] == pytest.approx(1.0, rel=1e-4)
 
