@@ -81,7 +81,7 @@ def page(rows: list[Played]) -> str:
         "",
         "    python -m benchmarks.speed.passage --table benchmarks/speed/passage.md",
         "",
-        f"`play` with the recipe `best` on {WORKERS} threads, from uncompressed TIFF (12 frames of 1280 × 512 a group) to sound "
+        f"`play` with `best` on {WORKERS} threads, from uncompressed TIFF (12 frames of 1280 × 512 a group) to sound "
         "files, report and picture; learning takes its 64 groups however long the passage is.",
         "*× the one before*: the passage is twice as long, so this should be 2.00.",
         "",

@@ -110,12 +110,12 @@ def _witnesses(rng: np.random.Generator, spread_px: float = 0.0) -> tuple[np.nda
     """C⁻¹ and C′, the same in all bins, and both forms."""
     inverse, change = np.linalg.inv(_positive(rng, ROWS)), _symmetric(rng, ROWS)
     every = [np.broadcast_to(one, (BINS, ROWS, ROWS)) for one in (inverse, change)]
-    forms = witness_forms(every[0], every[1], np.full(BINS, NOISE), spread_px=spread_px)
+    forms = witness_forms(every[0], every[1], spread_px=spread_px)
     return inverse, change, list(forms)
 
 
 def _told(window: np.ndarray, inverse: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """−(x − N y)'·y and −½ y·C′y of each column of a wide window, the noise being known in the window only."""
+    """−(x − N y)'·y and −½ y·C′y of each column of a wide window; of the noise N y nothing should be heard."""
     y = window[:, INNER] @ inverse
     still = np.pad(NOISE * y, ((0, 0), (8, 8)))
     slope = np.zeros_like(y)
@@ -148,7 +148,7 @@ def test_through_filters_both_witnesses_are_heard_in_each_column() -> None:
 def test_a_wave_along_the_groove_is_heard_by_what_is_known_at_its_frequency(cycles: int) -> None:
     rng = np.random.default_rng(cycles)
     covariance, changes = _smooth(_positive(rng, 2, ROWS)), _smooth(_symmetric(rng, 2, ROWS))
-    forms = witness_forms(np.linalg.inv(covariance), changes, np.full(BINS, NOISE), spread_px=0.0)
+    forms = witness_forms(np.linalg.inv(covariance), changes, spread_px=0.0)
     turn = 2 * np.pi * cycles / LENGTH * np.arange(LENGTH)
     window = np.outer(np.cos(turn), rng.normal(size=WIDE)) + np.outer(np.sin(turn), rng.normal(size=WIDE))
     mine = cycles - BAND.bins(LENGTH).start

@@ -92,7 +92,7 @@ def _bank(form: np.ndarray, spectra: np.ndarray) -> tuple[FilterBank, float]:
 def _known(move_px: float = 0.0) -> Known:
     inverse = np.linalg.inv(_covariance(move_px) + NOISE * np.eye(2 * HALF_PX + 1))
     spectra = _covariance(move_px, HALF_PX + REACH) + NOISE * np.eye(wide_rows(HALF_PX))
-    forms = witness_forms(inverse, _change(move_px), np.full(len(inverse), NOISE), spread_px=0.0)
+    forms = witness_forms(inverse, _change(move_px), spread_px=0.0)
     banks, loudness = zip(*(_bank(form, spectra) for form in forms), strict=True)
     answer = inverse @ _change(move_px)
     fisher = float(np.einsum("fij,fji->", answer, answer)) / LENGTH

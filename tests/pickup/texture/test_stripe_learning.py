@@ -74,7 +74,7 @@ def test_the_change_of_spectra_is_what_happens_when_paths_are_moved(
     monkeypatch.setattr(stripe_learning, "witness_forms", noted)
     few = StripeLearning(largest_lag_px=60, change_lag_px=25, least_columns=1000)
     few.learn(_material(true, layout, number), None, 0.003)
-    _, change, _ = told[-1]
+    _, change = told[-1]
     step_px = 0.2
     lower, higher = (
         _material([one.moved(np.full((2, 1), side)) for one in true], layout, number)

@@ -99,17 +99,16 @@ def _energies(p, sign, score, loudness):  # type: ignore[no-untyped-def]
             loudness[x] += energy
 
 
-def witness_forms(
-    inverse: FloatArray, change: FloatArray, noise: FloatArray, *, spread_px: float
-) -> tuple[FloatArray, FloatArray]:
-    """Return Q_f of both witnesses: −(x' − (N C⁻¹x)')ᵀ C⁻¹x and −½ xᵀ C⁻¹ C′ C⁻¹ x, each the mean of both sides of a path.
+def witness_forms(inverse: FloatArray, change: FloatArray, *, spread_px: float) -> tuple[FloatArray, FloatArray]:
+    """Return Q_f of both witnesses: −x'ᵀ C⁻¹x and −½ xᵀ C⁻¹ C′ C⁻¹ x, each the mean of both sides of a path.
+
+    The camera's noise N y, which does not move with the groove, need not be taken off x: of a form only the symmetric part
+    is heard, and (N y)'ᵀ y has none.
 
     Parameters
     ----------
     inverse, change : float64 arrays, shape (bin, row, row)
         C⁻¹ and C′.
-    noise : float64 array, shape (bin,)
-        N.
     spread_px : float
         How far on either side of the path the window is heard, less than 1.
 
@@ -120,11 +119,8 @@ def witness_forms(
     """
     rows = inverse.shape[1]
     near = GENTLE.size
-    derivative = across(rows, GENTLE)
     window = np.eye(rows, rows + 2 * near, near)
-    # what is explained by noise is known in the window only; beyond it counts as nothing
-    still = noise[:, None, None] * (derivative[:, near:-near] @ inverse @ window)
-    answers = (-(derivative - still).transpose(0, 2, 1), -0.5 * (window.T @ inverse @ change))
+    answers = (-across(rows, GENTLE).T, -0.5 * (window.T @ inverse @ change))
     sides = [shifted(rows + 2 * near, side) for side in (-spread_px, spread_px)]
     forms = []
     for answer in answers:

@@ -7,9 +7,9 @@ paths have in that round, so the whole series of models will lead any other stre
 the exact one. When the first exact model is to be learned it is learned in every tone, and the one that tells most is kept.
 
 A model calls the path that it was learned from right, whatever that is. So the groups are dealt out to a few folds, and the
-cross-spectra that move, judge and read a group are those of the other folds; only the tone, the whitening filter, and what
-witnesses are worth (their means, answers and powers) are those of all. In the first rounds all folds are lined up by much
-the same model all the same, and what that calls zero looks right to the next ones (docs/decisions/0006).
+cross-spectra that move, judge and read a group are those of the other folds; only the tone, the whitening filter, the
+channels, and what is said is worth (means, answers and powers) are those of all. In the first rounds all folds are lined
+up by much the same model all the same, and what that calls zero looks right to the next ones (docs/decisions/0006).
 """
 
 from __future__ import annotations

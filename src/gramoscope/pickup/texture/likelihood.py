@@ -4,14 +4,14 @@ Whitened windows x that follow the right path are Gaussian with the cross-spectr
 moved by δ(s) across the rows, x changes by δ(s) x'(s), and its cross-spectra by δ C′. Two witnesses tell from that in which
 direction a path should move, each with the constant that makes it zero on average:
 
-    u₁(s) = −x̂'(s) · y(s),     y = C⁻¹ x,     x̂ = x − N y,
+    u₁(s) = −x'(s) · y(s),     y = C⁻¹ x,
     u₂(s) = −½ y(s) · (C′ y)(s),
 
 with C⁻¹ and C′ applied in the frequency domain: local in every column, whatever the bandwidth of the sound. The first is the
-derivative of −½ Σ_f x_fᴴ C_f⁻¹ x_f along the picture's own change, from which the camera's noise of the power N is left out, as
-only the texture x̂ moves with the groove. The second is the score of the Gaussian likelihood of the window, and efficient if
-the texture is Gaussian and C′ well known; the first needs no C′ and forgives more. How far either can be trusted is measured:
-with their answers I to a path that is moved and their real powers J, a matrix, the weights J⁻¹I make of both the best score.
+derivative of −½ Σ_f x_fᴴ C_f⁻¹ x_f along the picture's own change. The second is the score of the Gaussian likelihood of the
+window, and efficient if the texture is Gaussian and C′ well known; the first needs no C′ and forgives more. How far either
+can be trusted is measured: with their answers I to a path that is moved and their real powers J, a matrix, the weights J⁻¹I
+make of both the best score.
 Of that score the strongest filters are kept (see `filter_bank`), and its own I and J measured; u/I estimates what is missing
 from the path, with the error √J/I.
 

@@ -42,7 +42,7 @@ LEAST_WEIGHT = 100.0
 MOVE_PX = 0.1
 """By which paths are moved to see how scores answer."""
 SMOOTH_CYCLES = 0.011
-"""Cycles a pixel over which what is known of the noise is smoothed."""
+"""Cycles a pixel over which the least that a covariance may have is smoothed."""
 INNER_ROWS = slice(REACH, -REACH)
 
 
@@ -270,11 +270,11 @@ class StripeLearning:
         bins = model.band.bins(self.length)
         wide = sums.spectra(largest_lag_px=self.largest_lag_px, length=self.length)
         c = wide[:, INNER_ROWS, INNER_ROWS]
-        inverse, noise = precision(c, band=bins, loading=loading, smooth_bins=SMOOTH_CYCLES * self.length)
+        inverse, _ = precision(c, band=bins, loading=loading, smooth_bins=SMOOTH_CYCLES * self.length)
         near = sums.spectra(largest_lag_px=self.change_lag_px, length=self.length)[bins]
         slope = np.pad(across(c.shape[1], SHARP), ((0, 0), (REACH - SHARP.size,) * 2))
         half = slope @ near[:, :, INNER_ROWS]
-        forms = witness_forms(inverse, half + half.transpose(0, 2, 1), noise, spread_px=model.spread_px)
+        forms = witness_forms(inverse, half + half.transpose(0, 2, 1), spread_px=model.spread_px)
         return Forms(forms, wide[bins], self.length)
 
     def _deaf(self, sums: CrossSpectra, known: Forms) -> FilterBank:
