@@ -392,3 +392,13 @@ def test_filters_at_other_bins_lie_between_those_that_are_known() -> None:
         filters[3],
     ]
     np.testing.assert_allclose(found, known, atol=1e-12)
+
+
+def test_where_nothing_was_seen_filters_say_nothing_and_nothing_fails() -> None:
+    nothing = np.zeros((5, WIDE, WIDE))
+    patterns = strongest_patterns(nothing[0], 2)
+    basis = common_channels((nothing, nothing), nothing, patterns, 6)
+    form, seen = through_channels(nothing, nothing, basis)
+    filters, _ = strongest_filters(form, seen, 4)
+    np.testing.assert_array_equal(filters, 0)
+    assert np.isfinite(usual_power(nothing[0], basis, INNER)).all()

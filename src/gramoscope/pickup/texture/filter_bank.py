@@ -137,6 +137,13 @@ def root(covariance: FloatArray) -> FloatArray:
     return np.asarray(vector * np.sqrt(safe)[..., None, :])
 
 
+def _safe(covariance: FloatArray) -> FloatArray:
+    """A covariance that can be inverted even where nothing was seen."""
+    size = covariance.shape[-1]
+    mean = np.trace(covariance, axis1=-2, axis2=-1) / size
+    return np.asarray(covariance + (1e-12 * mean + 1e-30)[..., None, None] * np.eye(size))
+
+
 def strongest_patterns(covariance: FloatArray, count: int) -> FloatArray:
     """Return the patterns that have most of a window's power, every row counting the same.
 
@@ -171,7 +178,7 @@ def usual_power(covariance: FloatArray, basis: FloatArray, rows: slice) -> Float
     float64 array, shape (channel, channel)
     """
     seen = basis.T @ covariance @ basis
-    expected = np.linalg.solve(seen, (covariance @ basis).T)[:, rows]
+    expected = np.linalg.solve(_safe(seen), (covariance @ basis).T)[:, rows]
     form = (expected / np.maximum(np.diag(covariance)[rows], 1e-30)) @ expected.T
     return root(form / max(float(np.trace(form @ seen)), 1e-30))
 
@@ -218,7 +225,7 @@ def through_channels(form: FloatArray, spectra: FloatArray, basis: FloatArray) -
     float64 arrays, shape (bin, channel, channel)
     """
     seen = basis.T @ spectra @ basis
-    expected = np.linalg.solve(seen, (spectra @ basis).transpose(0, 2, 1)).transpose(0, 2, 1)
+    expected = np.linalg.solve(_safe(seen), (spectra @ basis).transpose(0, 2, 1)).transpose(0, 2, 1)
     return np.asarray(expected.transpose(0, 2, 1) @ form @ expected), np.asarray(seen)
 
 

@@ -130,7 +130,7 @@ class Evidence:
         Sums over the stripes of each wall, weighted so that the information is the inverse of the variance of
         score/information; 0 where nothing was read.
     surprise : float64 array, shape (2,)
-        Power of the score in this stretch over what was learned; 1 on average, NaN for a wall that was not read.
+        Power of the score in this stretch over what was learned; 1 on average, NaN for a wall that was not read or judged.
     """
 
     score: FloatArray
