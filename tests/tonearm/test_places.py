@@ -35,7 +35,7 @@ SPECTRA: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "speech": _speech,
     "dull speech": _dull,
 }
-WIDE_COST = {"wide": 1.3, "dull speech": 1.4, "1 kHz": 1.45}
+WIDE_COST = {"wide": 1.28, "dull speech": 1.38, "1 kHz": 1.38}
 """What it costs to expect breath, and the record's own noise, where there is none."""
 SURFACE_M_S = 0.03 * 10 ** (-36 / 20)
 """Noise of a record's surface, 36 dB below the loud sounds here: as much as lacquer has, less than shellac."""
@@ -141,12 +141,12 @@ def test_a_direction_that_nothing_was_seen_of_is_unknown(bench: Any, lose: Calla
     assert 0.8 < heard.ratio(VERTICAL, heard.measured) < 1.5
 
 
-@pytest.mark.parametrize("amplitude_m", [10e-6, 100e-6])
-def test_a_third_of_the_samples_may_be_wild(bench: Any, amplitude_m: float) -> None:
+# with a third of the samples far off more of the breath drowns that is expected, and claims have room for it
+@pytest.mark.parametrize(("amplitude_m", "largest_ratio"), [(10e-6, 1.3), (100e-6, 1.42)])
+def test_a_third_of_the_samples_may_be_wild(bench: Any, amplitude_m: float, largest_ratio: float) -> None:
     worse, wrong, ratios = [], [], []
     for seed in range(5):
-        lateral = bench.course(_speech, 0.03, groups=GROUPS, seed=seed)
-        vertical = bench.course(_speech, 0.004, groups=GROUPS, seed=seed + 50)
+        lateral, vertical = _both(bench, seed=seed)
         traces, rng = bench.traces(lateral, vertical, groups=GROUPS), np.random.default_rng(seed)
         spoilt = []
         for trace in traces:
@@ -162,11 +162,8 @@ def test_a_third_of_the_samples_may_be_wild(bench: Any, amplitude_m: float) -> N
     # where half of a neighbourhood happens to agree on something else, nobody could tell
     assert np.median(worse) < 4
     assert np.max(np.mean(wrong, axis=0)) < 0.01
-    # with a third of the samples gone more of the breath drowns, and the claim has room for more than there is,
-    # of the soft voice above all
-    lateral_ratio, vertical_ratio = np.mean(ratios, axis=0)
-    assert 0.8 < lateral_ratio < 1.4
-    assert 0.8 < vertical_ratio < 1.6
+    assert np.all(np.mean(ratios, axis=0) > 0.8)
+    assert np.all(np.mean(ratios, axis=0) < largest_ratio)
     # both walls wild in three neighbouring samples
     assert ((heard.flags & Quality.OUTLIER) != 0).any()
 

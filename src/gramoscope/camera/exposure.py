@@ -56,12 +56,14 @@ class Exposure:
     def is_dark(self, frame: Frame, *, white_level: int) -> bool:
         """Tell whether a frame, shape (row, column), shows no light or no contrast."""
         mean, contrast, _ = _levels(frame, white_level)
-        return bool(mean < self.least_mean * white_level or contrast < self.least_contrast * white_level)
+        return self._dark(mean, contrast, white_level)
 
     def is_saturated(self, frame: Frame, *, white_level: int) -> bool:
         """Tell whether too much of a frame, shape (row, column), is at full scale."""
-        _, _, share = _levels(frame, white_level)
-        return bool(share > self.saturated_share)
+        return bool(_levels(frame, white_level)[2] > self.saturated_share)
+
+    def _dark(self, mean: float, contrast: float, white_level: int) -> bool:
+        return bool(mean < self.least_mean * white_level or contrast < self.least_contrast * white_level)
 
     def sort_out(self, group: FrameGroup) -> tuple[FrameGroup, Quality]:
         """Return the group without its useless frames, and why they are useless.
@@ -85,8 +87,9 @@ class Exposure:
         return dataclasses.replace(group, valid=valid, problems=tuple(problems)), flags
 
     def _fault(self, frame: Frame, white_level: int) -> tuple[Quality, str]:
-        if self.is_saturated(frame, white_level=white_level):
+        mean, contrast, full = _levels(frame, white_level)
+        if full > self.saturated_share:
             return Quality.SATURATED, f"too bright, more than {self.saturated_share:.0%} at full scale"
-        if self.is_dark(frame, white_level=white_level):
+        if self._dark(mean, contrast, white_level):
             return Quality.DARK, "no light or no contrast"
         return Quality(0), ""

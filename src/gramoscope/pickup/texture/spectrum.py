@@ -7,7 +7,7 @@ stationary along the groove, everything that second moments can tell is in the c
 
 real because a groove has no preferred direction along itself. Lags beyond the blur discs carry nothing but chance, so the
 sums are cut off there (Blackman and Tukey's lag window), which also makes C_f smooth in f. Moving the window by δ across
-the rows changes C_f by δ · C′_f, with C′_f from the cross-spectra of the window and its derivative.
+the rows changes C_f by δ · C′_f, which is in the cross-spectra of a window that is a few rows wider.
 
 A texture's power falls by five orders of magnitude along the band, and what leaks from the strong end would drown the weak
 end where the information is. All windows are therefore whitened along the groove first, by one short filter for all rows.
