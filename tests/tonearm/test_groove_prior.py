@@ -20,14 +20,14 @@ PRIORS = [
 def _spectrum(prior: GroovePrior) -> tuple[np.ndarray, np.ndarray]:
     """Wave numbers and the variance of the slope at each, for a body of variance 1."""
     k = np.geomspace(1.0, 1e8, 400_001)
-    body = np.gradient(k) / ((k**2 + prior.corner_per_m**2) ** 2 * (k**2 + prior.cutoff_per_m**2) ** 3)
-    wide = np.gradient(k) / (k**2 + prior.width_per_m**2) ** 2
+    body = np.gradient(k) / ((k**2 + prior.corner_per_m**2) ** 2 * (k**2 + prior.cutoff_per_m**2) ** 2)
+    wide = np.gradient(k) / (k**2 + prior.width_per_m**2) ** 3
     return k, body / body.sum() + prior.wide_share**2 * wide / wide.sum()
 
 
 def _in_other_steps(step_m: float) -> np.ndarray:
     """Turns a state in steps of one length into one in steps of `STEP_M`."""
-    powers = np.r_[np.arange(WIDE), 1, 2]
+    powers = np.r_[np.arange(WIDE), 1, 2, 3]
     return np.diag((STEP_M / step_m) ** powers)
 
 

@@ -60,8 +60,8 @@ def _place_covariance(prior: GroovePrior, sigma: float, bins: np.ndarray) -> np.
     # ∫∫ of the slope's covariance, by the midpoint rule on a grid twenty times finer
     arc = (np.arange((bins.max()) * fine) + 0.5) * STEP_M / fine
     k = (np.arange(12_000) + 0.5) * 120.0
-    body = 1 / ((k**2 + prior.corner_per_m**2) ** 2 * (k**2 + prior.cutoff_per_m**2) ** 3)
-    wide = 1 / (k**2 + prior.width_per_m**2) ** 2
+    body = 1 / ((k**2 + prior.corner_per_m**2) ** 2 * (k**2 + prior.cutoff_per_m**2) ** 2)
+    wide = 1 / (k**2 + prior.width_per_m**2) ** 3
     density = body / body.sum() + prior.wide_share**2 * wide / wide.sum()
     lag = np.arange(arc.size) * STEP_M / fine
     correlation = np.array([(density * np.cos(k * x)).sum() for x in lag])

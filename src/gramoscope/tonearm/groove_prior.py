@@ -2,19 +2,19 @@
 
 The slope da/ds = u + v is taken for the sum of two stationary Gaussian processes, a *body* u and a weaker, *wide* v:
 
-    S_u(k) = q_u / ((k² + λ²)² (k² + μ²)³),     S_v(k) = q_v / (k² + ν²)².
+    S_u(k) = q_u / ((k² + λ²)² (k² + μ²)²),     S_v(k) = q_v / (k² + ν²)³.
 
-The body is flat up to the corner λ, then falls by 12 dB an octave, and by 30 dB an octave beyond the cut-off μ, as everything
+The body is flat up to the corner λ, then falls by 12 dB an octave, and by 24 dB an octave beyond the cut-off μ, as everything
 does that a cutter has cut. How steeply it falls matters more than its shape where the groove is well seen, for above the
 frequency where the readings drown in their own noise the prior has the word. Errors of places that are white make errors of
 velocity that rise as k², cut off where S falls below them; a smoother that believes S ~ k^(−2p) there while nothing is there
-claims errors √(n/(n−1)) too large, n = (2p + 2)/3: by 1.41 for Matérn's process of order 3/2, by 1.15 for the body. And a
-groove rougher than the prior gets errors that are claimed too small: consonants, cymbals and surface lie 30 … 45 dB below
-the music's strongest octaves, reach far beyond them, and where they drown their power belongs into the error bar. They are
-what v is for. With λ far below μ the body is nearly Matérn's process of order 3/2, with both together that of order 9/2, and
-the capture chooses.
+claims errors √(n/(n−1)) too large, n = (2p + 2)/3: by 1.41 for Matérn's process of order 3/2, by 1.20 for the body, by 1.26 for
+what is wide. And a groove rougher than the prior gets errors that are claimed too small: consonants, cymbals and surface lie
+30 … 45 dB below the music's strongest octaves, reach far beyond them, and where they drown their power belongs into the error
+bar. They are what v is for. With λ far below μ the body is nearly Matérn's process of order 3/2, with both together that of
+order 7/2, and the capture chooses.
 
-The state is (a, u, u′, …, u⁗, v, v′), each derivative times the power of the grid's step Δ that makes it a length: it means
+The state is (a, u, …, u‴, v, v′, v″), each derivative times the power of the grid's step Δ that makes it a length: it means
 the same whatever the prior is, and its parts are of like size. Over one step it moves by A = exp(F) with noise of covariance
 Q = ∫₀¹ exp(Ft) W exp(Ft)ᵀ dt: Taylor's series over a short step (dQ/dt = FQ + QFᵀ + W), then doubled by
 Q ← Q + A Q Aᵀ, A ← A² as often as needed. Doubled until A is nothing, the same gives the covariance at rest.
@@ -23,7 +23,7 @@ Q ← Q + A Q Aᵀ, A ← A² as often as needed. Doubled until A is nothing, th
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import comb, factorial
+from math import factorial
 
 import numba
 import numpy as np
@@ -31,7 +31,7 @@ import numpy as np
 from gramoscope.conventions import FloatArray
 from gramoscope.tonearm.small_matrices import STATES
 
-CORNER_POLES, CUTOFF_POLES, WIDE_POLES = 2, 3, 2
+CORNER_POLES, CUTOFF_POLES, WIDE_POLES = 2, 2, 3
 ORDER = CORNER_POLES + CUTOFF_POLES
 """Poles of u."""
 BODY, WIDE = 1, 1 + ORDER
@@ -97,29 +97,32 @@ class GroovePrior:
         return float(np.sqrt(variance) / BEND_M)
 
     def _process(self, step_m: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """F, density of the noise, and covariance at rest of (u, …, u⁗, v, v′), in steps and for var u = 1."""
+        """F, density of the noise, and covariance at rest of (u, …, u‴, v, v′, v″), in steps and for var u = 1."""
         drift, noise, resting = (np.zeros((size, size)) for size in (STATES, STATES, STATES - 1))
         drift[0] = SLOPE
-        body, wide = slice(BODY, WIDE), slice(WIDE, STATES)
-        moving, density, rest = _body(self.corner_per_m * step_m, self.cutoff_per_m * step_m)
-        drift[body, body], noise[WIDE - 1, WIDE - 1], resting[: WIDE - 1, : WIDE - 1] = moving, density, rest
-        width = self.width_per_m * step_m
-        drift[wide, wide] = [[0.0, 1.0], [-(width**2), -2 * width]]
-        noise[-1, -1] = 4 * width**3 * self.wide_share**2
-        resting[WIDE - 1 :, WIDE - 1 :] = self.wide_share**2 * np.diag([1.0, width**2])
+        corner, cutoff, width = (k * step_m for k in (self.corner_per_m, self.cutoff_per_m, self.width_per_m))
+        parts = (
+            (BODY, [corner] * CORNER_POLES + [cutoff] * CUTOFF_POLES, 1.0),
+            (WIDE, [width] * WIDE_POLES, self.wide_share**2),
+        )
+        for first, poles, power in parts:
+            moving, density, rest = _coloured(np.array(poles))
+            part, without_place = slice(first, first + len(poles)), slice(first - 1, first - 1 + len(poles))
+            drift[part, part], resting[without_place, without_place] = moving, power * rest
+            noise[part.stop - 1, part.stop - 1] = power * density
         return drift, step_m**2 * noise, step_m**2 * resting
 
 
-def _body(corner: float, cutoff: float) -> tuple[FloatArray, float, FloatArray]:
-    """F, density of the noise and covariance at rest of (u, u′, …, u⁗), in steps, for var u = 1."""
-    # in units in which the poles lie about one, so that nothing is lost between u and u⁗
-    unit = (corner**CORNER_POLES * cutoff**CUTOFF_POLES) ** (1 / ORDER)
-    moving = np.diag(np.ones(ORDER - 1), 1)
-    moving[-1] = _friction(corner / unit, cutoff / unit)
-    last = np.zeros((ORDER, ORDER))
+def _coloured(poles: FloatArray) -> tuple[FloatArray, float, FloatArray]:
+    """F, density of the noise and covariance at rest of (u, u′, …), white noise behind so many poles, for var u = 1."""
+    # in units in which the poles lie about one, so that nothing is lost between the first and the last
+    order, unit = poles.size, float(np.exp(np.log(poles).mean()))
+    moving = np.diag(np.ones(order - 1), 1)
+    moving[-1] = -np.poly(-poles / unit)[:0:-1]
+    last = np.zeros((order, order))
     last[-1, -1] = 1.0
     resting = at_rest(moving, last)
-    scale = unit ** np.arange(ORDER)
+    scale = unit ** np.arange(order)
     power = 1 / resting[0, 0]
     return (
         unit * moving * np.outer(scale, 1 / scale),
@@ -134,13 +137,6 @@ def start(at_rest: FloatArray, sigma: float, *, place_sigma_m: float) -> FloatAr
     covariance[0, 0] = place_sigma_m**2
     covariance[1:, 1:] = sigma**2 * at_rest
     return covariance
-
-
-def _friction(corner: float, cutoff: float) -> FloatArray:
-    """Minus the coefficients of (s + λ)² (s + μ)³ below the highest, lowest first."""
-    slow = np.array([comb(CORNER_POLES, i) * corner ** (CORNER_POLES - i) for i in range(CORNER_POLES + 1)])
-    fast = np.array([comb(CUTOFF_POLES, i) * cutoff ** (CUTOFF_POLES - i) for i in range(CUTOFF_POLES + 1)])
-    return -np.asarray(np.convolve(slow, fast)[:-1], np.float64)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -215,7 +211,7 @@ def taylor(fraction: FloatArray) -> FloatArray:
     Returns
     -------
     float64 array, shape (reading, 8)
-        Of v only its first two derivatives count.
+        Of u four terms of the series count, of v three.
     """
     powers = [fraction**i / factorial(i) for i in range(WIDE + 1)]
-    return np.stack([*powers[:WIDE], powers[1], powers[2]], axis=-1)
+    return np.stack([*powers[:WIDE], *powers[1 : 1 + WIDE_POLES]], axis=-1)

@@ -23,14 +23,14 @@ from gramoscope.tonearm.steady_likelihood import steady_log_likelihood
 
 GATE = 4.0
 """Samples further than this many standard errors from their prediction count as if they lay right there."""
-DRIFT = np.array([0.7, 0.35, 0.35, 0.5, 0.35])
+DRIFT = np.array([0.7, 0.35, 0.25, 0.5, 0.35])
 """How much λ, μ, ν, the wide share and the share are expected to change from one learning to the next, e-folds."""
-UNHEARD = np.array([np.inf, np.inf, 0.7, 1.2, np.inf])
+UNHEARD = np.array([np.inf, np.inf, 0.25, 0.6, np.inf])
 """How well they are known before anything was learned, e-folds: nothing of the body, something of what is wide."""
 WIDE_SHARES = (1e-3, 0.3)
 """Least and largest √(var v / var u)."""
-USUAL_WIDE_SHARE = 0.02
-"""− 34 dB. Where what is wide drowns, only this is known of it. Recordings of speech, song, piano and orchestra, where they
+USUAL_WIDE_SHARE = 0.025
+"""− 32 dB. Where what is wide drowns, only this is known of it. Recordings of speech, song, piano and orchestra, where they
 were heard well enough, had 0.02 … 0.1."""
 SHARES = (0.3, 10.0)
 """Least and largest bend, for each unit of the level."""
@@ -50,12 +50,15 @@ class PriorLimits:
         What a groove bends at the least.
     corner_per_m, cutoff_per_m, width_per_m : (float, float)
         Least and largest.
+    usual_width_per_m : float
+        Expected before anything was heard.
     """
 
     floor: float
     corner_per_m: tuple[float, float]
     cutoff_per_m: tuple[float, float]
     width_per_m: tuple[float, float]
+    usual_width_per_m: float
 
     @property
     def logarithms(self) -> FloatArray:
@@ -65,7 +68,8 @@ class PriorLimits:
     @property
     def middle(self) -> GroovePrior:
         """What is believed when nothing can be learned."""
-        return _prior(np.array([*self.logarithms[:3].mean(axis=1), np.log(USUAL_WIDE_SHARE), 0.0]), self)
+        corner, cutoff = self.logarithms[:2].mean(axis=1)
+        return _prior(np.array([corner, cutoff, np.log(self.usual_width_per_m), np.log(USUAL_WIDE_SHARE), 0.0]), self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +109,7 @@ def learn(
     Returns
     -------
     GroovePrior
-        By bounded Nelder–Mead over the logarithms of λ, μ and share; `before`, or the middle of the limits, when there
+        By bounded Nelder–Mead over the logarithms of all five; `before`, or the middle of the limits, when there
         are no lessons.
     """
     if not lessons:

@@ -50,6 +50,8 @@ class PlaceSmoother:
         A sample further than this many standard errors from what the others say is an outlier and gets no weight.
     corner_limits_hz, cutoff_limits_hz, width_limits_hz : (float, float)
         Least and largest corner λV/2π, cut-off μV/2π and width νV/2π that the music may have.
+    usual_width_hz : float
+        Width νV/2π that is expected before anything was heard; only what is heard clearly moves it by much.
     floor_m_s : float
         Least change of velocity over `BEND_M` (standard deviation) that the prior expects of the direction that is
         listened to.
@@ -63,7 +65,8 @@ class PlaceSmoother:
     gate: float = 5.0
     corner_limits_hz: tuple[float, float] = (300.0, 20_000.0)
     cutoff_limits_hz: tuple[float, float] = (2_000.0, 60_000.0)
-    width_limits_hz: tuple[float, float] = (6_000.0, 15_000.0)
+    width_limits_hz: tuple[float, float] = (6_000.0, 30_000.0)
+    usual_width_hz: float = 9_500.0
     floor_m_s: float = 3e-4
     other_floor_m_s: float = 2e-4
 
@@ -75,6 +78,8 @@ class PlaceSmoother:
             require(0 < floor < 0.5, f"a floor of {floor} m/s", "above 0, below 0.5")
         for low, high in (self.corner_limits_hz, self.cutoff_limits_hz, self.width_limits_hz):
             require(0 < low < high, f"limits of {low} … {high} Hz", "two rising frequencies")
+        low, high = self.width_limits_hz
+        require(low <= self.usual_width_hz <= high, f"a usual width of {self.usual_width_hz} Hz", "within its limits")
 
     def follow(self, traces: Iterable[WallTrace], course: Course) -> Iterator[GrooveMotion]:
         """Smooth the places of spliced stretches.
@@ -107,6 +112,7 @@ class PlaceSmoother:
             corner_limits_hz=self.corner_limits_hz,
             cutoff_limits_hz=self.cutoff_limits_hz,
             width_limits_hz=self.width_limits_hz,
+            usual_width_hz=self.usual_width_hz,
             floor_m_s=self.floor_m_s,
             other_floor_m_s=self.other_floor_m_s,
         )

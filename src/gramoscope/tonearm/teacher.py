@@ -44,6 +44,7 @@ class Teaching:
     corner_limits_hz: tuple[float, float]
     cutoff_limits_hz: tuple[float, float]
     width_limits_hz: tuple[float, float]
+    usual_width_hz: float
     floor_m_s: float
     other_floor_m_s: float
 
@@ -157,7 +158,7 @@ class Teacher:
                 self.teaching.width_limits_hz,
             )
         )
-        return PriorLimits(floor / speed, corner, cutoff, width)
+        return PriorLimits(floor / speed, corner, cutoff, width, 2 * np.pi * self.teaching.usual_width_hz / speed)
 
 
 def _put_right(stretch: Stretch, error: float) -> Stretch:
