@@ -9,7 +9,8 @@ import pytest
 
 from gramoscope.apparatus.bench import Bench, Sequence
 from gramoscope.errors import ArgumentError
-from gramoscope.pickup.texture.reading import Evidence, Stretch
+from gramoscope.pickup.texture.reading import Evidence
+from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.pickup.texture_likelihood import STRIDE_PX, TextureLikelihood, samples_of
 from gramoscope.quality import Quality
 from gramoscope.signal_path import FrameGroup

@@ -26,8 +26,9 @@ from gramoscope.pickup.texture.calibration import aligned_layout, calibration_of
 from gramoscope.pickup.texture.groove_search import GrooveSearch
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.learning import Learning, Lesson
-from gramoscope.pickup.texture.reading import Evidence, Rules, Stretch, read, settled, spaced
+from gramoscope.pickup.texture.reading import Evidence, Rules, read, settled, spaced
 from gramoscope.pickup.texture.sharpness import CELL_PX, sharpness
+from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.quality import Quality, no_flags
 from gramoscope.signal_path import FrameGroup, Texture, WallTrace
 
@@ -293,7 +294,8 @@ UNTAUGHT = "too little of the stripes is seen to learn their texture; the recipe
 
 def laid_out(laid: Overlay, white_level: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return a group's mean column by column, which columns rest on enough frames, and what is burnt out."""
-    return laid.columns, laid.frames * 2 >= laid.frames.max(), laid.columns >= NEARLY_WHITE * white_level
+    burnt = laid.columns >= NEARLY_WHITE * white_level
+    return laid.columns, laid.frames * 2 >= laid.frames.max(), burnt if burnt.any() else burnt[:, :0]
 
 
 def samples_of(stretch: Stretch, found: Evidence) -> tuple[FloatArray, FloatArray]:

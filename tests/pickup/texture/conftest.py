@@ -10,7 +10,7 @@ from scipy import fft, ndimage
 
 from gramoscope.conventions import INNER, OUTER, FloatArray
 from gramoscope.pickup.texture.layout import StripeLayout
-from gramoscope.pickup.texture.reading import Stretch
+from gramoscope.pickup.texture.stretch import Stretch
 
 WIDTH, HEIGHT = 900, 120
 LAYOUT = StripeLayout(

@@ -18,8 +18,9 @@ from gramoscope.pickup.texture.following import wide_rows
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.learning import Learning, Lesson
 from gramoscope.pickup.texture.likelihood import StripeStatistics
-from gramoscope.pickup.texture.reading import Evidence, Model, Rules, Stretch, evidence, read
+from gramoscope.pickup.texture.reading import Evidence, Model, Rules, evidence, read
 from gramoscope.pickup.texture.spectrum import Band, whitening_filter
+from gramoscope.pickup.texture.stretch import Stretch
 
 SHORT = Learning(half_px=9, largest_lag_px=60, loading=(0.03, 0.01, 0.003), least_columns=3000, folds=3)
 RULES = Rules()

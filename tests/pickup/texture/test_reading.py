@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy import ndimage
 
 from gramoscope.conventions import INNER, OUTER, FloatArray
 from gramoscope.disc.formats import Cut
 from gramoscope.pickup.texture import reading
 from gramoscope.pickup.texture.filter_bank import FilterBank
+from gramoscope.pickup.texture.hearing import clear_columns
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.learning import Learning
 from gramoscope.pickup.texture.likelihood import StripeStatistics
@@ -20,16 +20,14 @@ from gramoscope.pickup.texture.reading import (
     Evidence,
     Model,
     Rules,
-    Stretch,
-    clear_columns,
     evidence,
-    gaussian,
     read,
     settled,
     spaced,
     step,
 )
 from gramoscope.pickup.texture.spectrum import Band
+from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.pickup.texture.tone import Tone
 
 WIDTH = 800
@@ -159,26 +157,30 @@ def test_a_model_is_as_precise_as_all_its_stripes_together(layout: StripeLayout)
     assert replace(model, stripes=(None, None)).precision == 0
 
 
-def _clear(stretch: Stretch, **changed: object) -> np.ndarray:
-    row, seen = np.full(900, 29.3), np.ones(900, bool)
-    return clear_columns(replace(stretch, **changed), 0, row, seen, 9, RULES)
+def _clear(stretch: Stretch, layout: StripeLayout, **changed: object) -> np.ndarray:
+    still = replace(stretch, displacement_px=np.full((2, 900), 0.3), **changed)
+    rows, clear = clear_columns(still, layout, np.array([0]), half_px=9, least_support=RULES.least_support)
+    np.testing.assert_allclose(rows, layout.rest_row[0] + 0.3)
+    return clear[0]
 
 
-def test_columns_that_are_burnt_thin_or_without_stripe_are_not_clear(another: Stretch) -> None:
-    assert _clear(another).all()
-    burnt, usable, support = another.burnt.copy(), another.usable.copy(), another.support.copy()
-    burnt[100:110, 25:33] = True
-    burnt[200:210, 25:26] = True
-    burnt[300:310, 60:] = True
-    (
-        np.testing.assert_array_equal(np.flatnonzero(~_clear(another, burnt=burnt)), np.arange(100, 110)),
-        "one grain is none",
-    )
+def test_columns_that_are_burnt_thin_or_without_stripe_are_not_clear(another: Stretch, layout: StripeLayout) -> None:
+    assert _clear(another, layout).all()
+    assert _clear(another, layout, burnt=another.burnt[:, :0]).all()
+    burnt, usable, support = np.zeros(another.columns.shape, bool), another.usable.copy(), another.support.copy()
+    row = round(layout.rest_row[0])
+    burnt[100:110, row - 4 : row + 4] = True
+    burnt[200:210, row - 4] = True
+    burnt[300:310, row + 20 :] = True
+    spoilt = np.flatnonzero(~_clear(another, layout, burnt=burnt))
+    np.testing.assert_array_equal(spoilt, np.arange(100, 110), "one grain is none")
     usable[:40] = False
-    np.testing.assert_array_equal(np.flatnonzero(~_clear(another, usable=usable)), np.arange(40))
+    np.testing.assert_array_equal(np.flatnonzero(~_clear(another, layout, usable=usable)), np.arange(40))
     support[0, 500:] = 0.5 * RULES.least_support
     support[1] = 0
-    np.testing.assert_array_equal(np.flatnonzero(~_clear(another, support=support)), np.arange(500, 900))
+    np.testing.assert_array_equal(np.flatnonzero(~_clear(another, layout, support=support)), np.arange(500, 900))
+    away = replace(another, displacement_px=np.full((2, 900), 1e3))
+    assert not clear_columns(away, layout, np.arange(2), half_px=9, least_support=0.0)[1].any()
 
 
 def test_a_damaged_place_says_nothing_and_spoils_nothing(
@@ -343,11 +345,3 @@ def test_a_tone_is_laid_upon_a_picture_once(another: Stretch) -> None:
     assert another.in_tone(Tone(80.0, 0.0)) is another
     with pytest.raises(AssertionError):
         seen.in_tone(Tone(100.0, 0.5))
-
-
-@pytest.mark.parametrize("sigma", [1.3, 12.0, 200.0])
-def test_smoothing_by_transforms_is_smoothing(sigma: float) -> None:
-    values = np.random.default_rng(2).normal(size=WIDTH) + 3
-    np.testing.assert_allclose(
-        gaussian(values, sigma), ndimage.gaussian_filter1d(values, sigma, mode="nearest"), atol=1e-9
-    )

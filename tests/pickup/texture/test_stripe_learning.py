@@ -16,8 +16,9 @@ from gramoscope.pickup.texture.filter_bank import witness_forms
 from gramoscope.pickup.texture.following import REACH
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.likelihood import StripeStatistics
-from gramoscope.pickup.texture.reading import Model, Rules, Stretch, evidence
+from gramoscope.pickup.texture.reading import Model, Rules, evidence
 from gramoscope.pickup.texture.spectrum import Band, whitening_filter
+from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.pickup.texture.stripe_learning import StripeLearning, StripeMaterial
 from gramoscope.pickup.texture.tone import Tone
 

@@ -68,28 +68,31 @@ class FilterBank:
             Of the transform, at least the number of columns.
         """
         spectrum = fft.rfft(channels, length, axis=0)
-        through = np.zeros((self.sign.size, spectrum.shape[0]), np.complex64)
-        _through(spectrum[band.bins(length)], self.filters, through[:, band.bins(length)])
-        p = fft.irfft(through, length)
+        through = np.zeros((1, self.sign.size, spectrum.shape[0]), np.complex64)
+        let_through(spectrum[np.newaxis], self.filters[np.newaxis], band.bins(length).start, through)
+        p = fft.irfft(through[0], length)
         score, loudness = np.empty((2, channels.shape[0]), np.float32)
-        _energies(p, self.sign, score, loudness)
+        energies(p, self.sign, score, loudness)
         return score, loudness
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def _through(spectrum, filters, through):  # type: ignore[no-untyped-def]
-    bins, count, channels = filters.shape
-    for b in range(bins):
-        for k in range(count):
-            real, imaginary = np.float32(0), np.float32(0)
-            for c in range(channels):
-                real += filters[b, k, c] * spectrum[b, c].real
-                imaginary += filters[b, k, c] * spectrum[b, c].imag
-            through[k, b] = complex(real, imaginary)
+def let_through(spectrum, filters, first, through):  # type: ignore[no-untyped-def]
+    """Write what each stripe's filters let through, [stripe, filter, bin], of [stripe, bin, channel], from a first bin on."""
+    stripes, bins, count, channels = filters.shape
+    for i in range(stripes):
+        for b in range(bins):
+            for k in range(count):
+                real, imaginary = np.float32(0), np.float32(0)
+                for c in range(channels):
+                    real += filters[i, b, k, c] * spectrum[i, first + b, c].real
+                    imaginary += filters[i, b, k, c] * spectrum[i, first + b, c].imag
+                through[i, k, first + b] = complex(real, imaginary)
 
 
 @numba.njit(cache=True, nogil=True)
-def _energies(p, sign, score, loudness):  # type: ignore[no-untyped-def]
+def energies(p, sign, score, loudness):  # type: ignore[no-untyped-def]
+    """Write Σ ± p² and Σ p² of the first columns of [filter, column]."""
     score[:], loudness[:] = np.float32(0), np.float32(0)
     for k in range(sign.size):
         row, s = p[k, : score.size], sign[k]

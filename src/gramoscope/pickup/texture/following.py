@@ -41,9 +41,7 @@ def interpolation_taps(fraction: FloatArray) -> Float32Array:
     return np.asarray(taps / taps.sum(axis=1, keepdims=True), np.float32)
 
 
-_TAPS = interpolation_taps(np.arange(PHASES + 1) / PHASES)
-
-
+TAPS_OF_PHASES = interpolation_taps(np.arange(PHASES + 1) / PHASES)
 REACH = 8
 """Rows beyond a window on each side that its derivatives, and windows a little to the side of it, need."""
 LANES = 16
@@ -122,10 +120,15 @@ def _followed(columns: Float32Array, path_row: FloatArray, half_px: int) -> Floa
     """A window with columns up to a multiple of `BLOCK`, those beyond the picture black, and rows up to one of `LANES`."""
     rows = wide_rows(half_px)
     width = columns.shape[0]
-    window = np.empty((-(-width // BLOCK) * BLOCK, -(-rows // LANES) * LANES), np.float32)
+    window = np.empty((-(-width // BLOCK) * BLOCK, padded_rows(rows)), np.float32)
     window[width:] = 0
-    _follow(columns, path_row, _TAPS, half_px + REACH, window[:width])
+    follow_rows(columns, path_row, TAPS_OF_PHASES, half_px + REACH, window[:width])
     return window
+
+
+def padded_rows(rows: int) -> int:
+    """Return how many rows a window is given in memory."""
+    return -(-rows // LANES) * LANES
 
 
 def shifted(rows: int, px: float) -> FloatArray:
@@ -168,31 +171,33 @@ def across(rows: int, slope: FloatArray) -> FloatArray:
 
 
 @numba.njit(cache=True, nogil=True)
-def _follow(columns, path_row, taps, half, window):  # type: ignore[no-untyped-def]
+def follow_rows(columns, path_row, taps, half, window):  # type: ignore[no-untyped-def]
+    """Write a window that begins `half` rows before the path, by the taps of evenly spaced phases from 0 to 1."""
     width, rows = window.shape
     height = columns.shape[1]
     reach = rows + taps.shape[1] - 1
     edge = np.empty(reach, np.float32)
+    picture = columns.reshape(columns.size)
     for x in range(width):
         floor = int(np.floor(path_row[x]))
         phase = int((path_row[x] - floor) * (taps.shape[0] - 1) + 0.5)
         first = floor - half - (taps.shape[1] // 2 - 1)
         if first >= 0 and first + reach <= height:
-            _interpolate(columns[x, first : first + reach], taps[phase], window[x])
+            _interpolate(picture, np.uint64(x * height + first), taps[phase], window[x])
         else:
             for j in range(reach):
                 edge[j] = columns[x, min(max(first + j, 0), height - 1)]
-            _interpolate(edge, taps[phase], window[x])
+            _interpolate(edge, np.uint64(0), taps[phase], window[x])
 
 
 @numba.njit(cache=True, nogil=True, fastmath={"contract"})
-def _interpolate(column, w, value):  # type: ignore[no-untyped-def]
-    """Ten taps at once, so that every value is written once."""
-    n = value.size
-    x0, x1, x2, x3, x4 = column[:n], column[1 : n + 1], column[2 : n + 2], column[3 : n + 3], column[4 : n + 4]
-    x5, x6, x7, x8, x9 = column[5 : n + 5], column[6 : n + 6], column[7 : n + 7], column[8 : n + 8], column[9 : n + 9]
+def _interpolate(picture, first, w, value):  # type: ignore[no-untyped-def]
+    """Ten taps at once, so that every value is written once; unsigned places, for signed ones may count from the end."""
     w0, w1, w2, w3, w4, w5, w6, w7, w8, w9 = w[0], w[1], w[2], w[3], w[4], w[5], w[6], w[7], w[8], w[9]
-    for j in range(n):
-        near = (w3 * x3[j] + w4 * x4[j]) + (w5 * x5[j] + w6 * x6[j])
-        far = (w0 * x0[j] + w1 * x1[j]) + (w2 * x2[j] + w7 * x7[j])
-        value[j] = near + far + (w8 * x8[j] + w9 * x9[j])
+    x0, x1, x2, x3, x4 = first, first + np.uint64(1), first + np.uint64(2), first + np.uint64(3), first + np.uint64(4)
+    x5, x6, x7 = first + np.uint64(5), first + np.uint64(6), first + np.uint64(7)
+    x8, x9 = first + np.uint64(8), first + np.uint64(9)
+    for j in range(np.uint64(value.size)):
+        near = (w3 * picture[x3 + j] + w4 * picture[x4 + j]) + (w5 * picture[x5 + j] + w6 * picture[x6 + j])
+        far = (w0 * picture[x0 + j] + w1 * picture[x1 + j]) + (w2 * picture[x2 + j] + w7 * picture[x7 + j])
+        value[j] = near + far + (w8 * picture[x8 + j] + w9 * picture[x9 + j])

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numba
 import numpy as np
 
 from gramoscope.apparatus.bench import Bench, Stripe
@@ -106,14 +107,32 @@ class StripeLayout:
 
         They must lie in the half of the picture that is sharp there, above the groove's rounded bottom, below the land.
         """
-        inside = (rows - half_px >= self.first_row[:, None]) & (rows + half_px <= self.last_row[:, None])
-        moved = rows - self.rest_row[:, None]
-        walls = [moved[self.wall == wall] for wall in (INNER, OUTER)]
-        lateral = np.mean([wall[0] for wall in walls if len(wall)], axis=0)
-        beside = rows - (self.middle_row + lateral)
-        from_middle = np.where(self.wall[:, None] == INNER, beside, -beside)
-        on_wall = (from_middle - half_px >= BOTTOM_PX) & (from_middle + half_px <= self.half_width_px)
-        return np.asarray(inside & on_wall)
+        seen = np.empty(rows.shape, np.bool_)
+        limits = (BOTTOM_PX + half_px, self.half_width_px - half_px)
+        _see(
+            rows, self.rest_row, self.wall, self.first_row, self.last_row, float(half_px), self.middle_row, limits, seen
+        )
+        return seen
+
+
+@numba.njit(cache=True, nogil=True)
+def _see(rows, rest_row, wall, first_row, last_row, half_px, middle_row, from_middle, seen):  # type: ignore[no-untyped-def]
+    # the groove's middle moves as the walls do in the mean, of which one stripe each tells
+    middle, walls = np.zeros(rows.shape[1]), 0
+    for w in (INNER, OUTER):
+        for i in range(wall.size):
+            if wall[i] == w:
+                middle += rows[i] - rest_row[i]
+                walls += 1
+                break
+    middle = middle_row + middle / max(walls, 1)
+    for i in range(rows.shape[0]):
+        side = 1.0 if wall[i] == INNER else -1.0
+        for x in range(rows.shape[1]):
+            row = rows[i, x]
+            away = side * (row - middle[x])
+            inside = (row - half_px >= first_row[i]) & (row + half_px <= last_row[i])
+            seen[i, x] = inside & (away >= from_middle[0]) & (away <= from_middle[1])
 
 
 def _all_stripes(bench: Bench) -> tuple[Stripe, ...]:

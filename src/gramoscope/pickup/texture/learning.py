@@ -25,10 +25,12 @@ from gramoscope.disc.formats import Cut
 from gramoscope.errors import require
 from gramoscope.pickup.cartridge import Spread
 from gramoscope.pickup.texture.following import REACH, wide_rows
+from gramoscope.pickup.texture.hearing import clear_columns
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.likelihood import StripeStatistics
-from gramoscope.pickup.texture.reading import Model, Rules, Stretch, clear_columns, evidence, step
+from gramoscope.pickup.texture.reading import Model, Rules, evidence, step
 from gramoscope.pickup.texture.spectrum import Band, whitening_filter
+from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.pickup.texture.stripe_learning import StripeLearning, StripeMaterial
 from gramoscope.pickup.texture.tone import Tone, mean_level
 
@@ -189,12 +191,13 @@ class Learning:
 
     def _power(self, stretch: Stretch, model: Model, rules: Rules) -> FloatArray | None:
         """Mean power spectrum of the rows of all stripes in pieces of 256 columns."""
-        rows = model.layout.rows(stretch.displacement_px)
-        visible = model.layout.visible(rows, half_px=self.half_px)
+        every = np.arange(model.layout.wall.size)
+        rows, seen = clear_columns(
+            stretch, model.layout, every, half_px=self.half_px, least_support=rules.least_support
+        )
         taper = np.hanning(256)
         spectra = []
-        for number, row in enumerate(rows):
-            clear = clear_columns(stretch, number, row, visible[number], self.half_px, rules)
+        for row, clear in zip(rows, seen, strict=True):
             if not clear.any():
                 continue
             window = model.window(stretch.in_tone(model.tone).columns, row)[:, REACH:-REACH]

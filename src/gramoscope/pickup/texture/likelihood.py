@@ -95,12 +95,13 @@ def said(channels: Float32Array, weight: Float32Array, bank: FilterBank, *, band
     """
     score, loudness = bank.heard(channels * weight[:, None], band=band, length=length)
     u = np.empty(score.size)
-    _temper(score, loudness, _LOUDNESS_BELL, TEMPER, u)
+    temper(score, loudness, LOUDNESS_BELL, TEMPER, u)
     return u
 
 
-_LOUDNESS_BELL = np.exp(-0.5 * (np.arange(int(4 * LOUDNESS_PX) + 1) / LOUDNESS_PX) ** 2).astype(np.float32)
-_LOUDNESS_BELL /= 2 * _LOUDNESS_BELL.sum() - _LOUDNESS_BELL[0]
+LOUDNESS_BELL = np.exp(-0.5 * (np.arange(int(4 * LOUDNESS_PX) + 1) / LOUDNESS_PX) ** 2).astype(np.float32)
+LOUDNESS_BELL /= 2 * LOUDNESS_BELL.sum() - LOUDNESS_BELL[0]
+"""From its middle on."""
 
 
 @numba.njit(cache=True, nogil=True, fastmath={"contract"})
@@ -110,7 +111,8 @@ def _add_scaled(w, before, after, out):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _temper(score, loudness, half_bell, temper, u):  # type: ignore[no-untyped-def]
+def temper(score, loudness, half_bell, least, u):  # type: ignore[no-untyped-def]
+    """Write scores over the local loudness and the least that it counts as."""
     width, reach = score.size, half_bell.size - 1
     wide = np.empty(width + 2 * reach, np.float32)
     wide[:reach], wide[reach : reach + width], wide[reach + width :] = loudness[0], loudness, loudness[-1]
@@ -118,7 +120,7 @@ def _temper(score, loudness, half_bell, temper, u):  # type: ignore[no-untyped-d
     for k in range(1, reach + 1):
         _add_scaled(half_bell[k], wide[reach - k : reach - k + width], wide[reach + k : reach + k + width], local)
     for x in range(width):
-        u[x] = score[x] / (temper + local[x])
+        u[x] = score[x] / (least + local[x])
 
 
 def best_shares(answers: FloatArray, powers: FloatArray) -> FloatArray:
@@ -149,29 +151,47 @@ def best_shares(answers: FloatArray, powers: FloatArray) -> FloatArray:
 
 def softened(valid: BoolArray) -> Float32Array:
     """Return a weight that is 1 well inside the valid columns and falls softly to 0 before their ends."""
-    weight = np.ones(valid.size, np.float32)
-    if not valid.all():
-        _soften(valid, _TAPER, weight)
+    weight = np.empty(valid.size, np.float32)
+    soften(valid, TAPER, weight)
     return weight
 
 
-_TAPER = np.hanning(2 * TAPER_PX + 3)[1:-1]
-_TAPER /= _TAPER.sum()
+TAPER = np.hanning(2 * TAPER_PX + 3)[1:-1]
+TAPER /= TAPER.sum()
 
 
 @numba.njit(cache=True, nogil=True)
-def _soften(valid, bell, weight):  # type: ignore[no-untyped-def]
-    """Erode by half the bell, beyond the ends all being valid, and smooth by it, the ends being held."""
+def _erode(valid, reach, core):  # type: ignore[no-untyped-def]
+    """Take away what is nearer than `reach` to something that is not valid; beyond the ends all is valid."""
+    away = reach
+    for x in range(valid.size):
+        away = away + 1 if valid[x] else 0
+        core[x] = away > reach
+    away = reach
+    for x in range(valid.size - 1, -1, -1):
+        away = away + 1 if valid[x] else 0
+        core[x] &= away > reach
+
+
+@numba.njit(cache=True, nogil=True)
+def soften(valid, bell, weight):  # type: ignore[no-untyped-def]
+    """Erode by half the bell and smooth by it, the ends being held; most columns are far from any edge."""
     width, reach = valid.size, bell.size // 2
-    core = np.ones(width)
+    core = np.empty(width, np.bool_)
+    _erode(valid, reach, core)
+    inside = 0
+    for k in range(-reach, reach + 1):
+        inside += core[min(max(k, 0), width - 1)]
     for x in range(width):
-        if not valid[x]:
-            core[max(0, x - reach) : x + reach + 1] = 0
-    for x in range(width):
-        total = 0.0
-        for k in range(bell.size):
-            total += bell[k] * core[min(max(x + k - reach, 0), width - 1)]
-        weight[x] = total
+        if inside == bell.size or inside == 0:
+            weight[x] = inside > 0
+        else:
+            total = 0.0
+            for k in range(bell.size):
+                total += bell[k] * core[min(max(x + k - reach, 0), width - 1)]
+            weight[x] = total
+        inside += core[min(x + 1 + reach, width - 1)]
+        inside -= core[max(x - reach, 0)]
 
 
 def quiet_power(said: FloatArray, weight: FloatArray) -> tuple[FloatArray, float]:
@@ -196,7 +216,13 @@ def quiet_power(said: FloatArray, weight: FloatArray) -> tuple[FloatArray, float
     return np.asarray((spectrum @ spectrum.conj().T).real / (high - low)), float(np.sum(weight**2))
 
 
-def believable(power: FloatArray | Float32Array, *, limits: tuple[float, float], smooth_px: int = 25) -> BoolArray:
+TEXTURE_PX = 25
+"""Texture is weighed over so many columns."""
+
+
+def believable(
+    power: FloatArray | Float32Array, *, limits: tuple[float, float], smooth_px: int = TEXTURE_PX
+) -> BoolArray:
     """Tell which columns have about the texture that they should: no scratch, no speck, no missing wall.
 
     Parameters
@@ -211,12 +237,12 @@ def believable(power: FloatArray | Float32Array, *, limits: tuple[float, float],
     bool array, shape (column,)
     """
     told = np.empty(power.size, np.bool_)
-    _within(power, smooth_px // 2, *limits, told)
+    within(power, smooth_px // 2, *limits, told)
     return told
 
 
 @numba.njit(cache=True, nogil=True)
-def _within(power, reach, low, high, told):  # type: ignore[no-untyped-def]
+def within(power, reach, low, high, told):  # type: ignore[no-untyped-def]
     """Whether the mean over ± reach columns, the ends being held, lies within limits."""
     width = power.size
     total = 0.0

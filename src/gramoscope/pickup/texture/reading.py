@@ -11,64 +11,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property
 
 import numba
 import numpy as np
-import numpy.typing as npt
-from scipy import fft
 
-from gramoscope.conventions import INNER, OUTER, BoolArray, Float32Array, FloatArray
+from gramoscope.conventions import INNER, OUTER, Float32Array, FloatArray
 from gramoscope.disc.formats import Cut
 from gramoscope.pickup.texture.filter_bank import FilterBank
 from gramoscope.pickup.texture.following import channels, follow
+from gramoscope.pickup.texture.hearing import Ear, add_up, ear_of, heard
 from gramoscope.pickup.texture.layout import StripeLayout
-from gramoscope.pickup.texture.likelihood import StripeStatistics, believable, quiet_power, said, softened
+from gramoscope.pickup.texture.likelihood import StripeStatistics, quiet_power
+from gramoscope.pickup.texture.smoothing import smooth, smoothed
 from gramoscope.pickup.texture.spectrum import Band, filtered
+from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.pickup.texture.tone import Tone
-
-AS_IT_IS = Tone()
-BURNT_SHARE = 0.15
-"""Of the rows of a window in one column: a bright grain or two do no harm, a scratch does."""
-
-
-@dataclass(frozen=True, eq=False)
-class Stretch:
-    """A stretch laid ready for reading.
-
-    Attributes
-    ----------
-    columns : float32 array, shape (column, row)
-        The registered picture, transposed.
-    usable : bool array, shape (column,)
-        Columns that rest on enough frames.
-    burnt : bool array, shape (column, row)
-        Places at full scale.
-    displacement_px : float64 array, shape (2, column)
-        The present path of each wall.
-    support : float64 array, shape (stripe, column)
-        How sharp the coarse search found each stripe.
-    tone : Tone
-        In which the picture is seen: before it is interpolated, for bright grains ring less then.
-    """
-
-    columns: Float32Array
-    usable: BoolArray
-    burnt: BoolArray
-    displacement_px: FloatArray
-    support: FloatArray
-    tone: Tone = AS_IT_IS
-
-    def in_tone(self, tone: Tone) -> Stretch:
-        """Return the same stretch seen in a tone; only a picture that is as it was can be seen in another one."""
-        if tone == self.tone or tone.compression == self.tone.compression == 0:
-            return self
-        assert self.tone.compression == 0
-        return replace(self, columns=tone(self.columns), tone=tone)
-
-    def moved(self, step_px: FloatArray) -> Stretch:
-        """Return the same stretch with its paths moved, shape (2, column)."""
-        return replace(self, displacement_px=self.displacement_px + step_px)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +62,18 @@ class Model:
     def window(self, columns: Float32Array, stripe_row: FloatArray) -> Float32Array:
         """Return the whitened window about a path and the rows beyond it, shape (column, row)."""
         return filtered(follow(columns, stripe_row, self.half_px), self.whitener)
+
+    @cached_property
+    def ear(self) -> Ear:
+        """The stripes that can be read, laid together."""
+        return ear_of(
+            self.stripes,
+            self.layout.wall,
+            self.whitener,
+            half_px=self.half_px,
+            band=self.band,
+            length=self.length,
+        )
 
     def channels(self, columns: Float32Array, stripe_row: FloatArray, bank: FilterBank) -> Float32Array:
         """Return the channels of the whitened window about a path, shape (column, channel)."""
@@ -172,54 +142,24 @@ class Rules:
     momentum: float = 0.3
 
 
-def clear_columns(
-    stretch: Stretch, number: int, stripe_row: FloatArray, visible: BoolArray, half_px: int, rules: Rules
-) -> BoolArray:
-    """Tell in which columns a stripe is there and can be seen whole, by enough frames and without burnt places."""
-    clear = visible & stretch.usable & (stretch.support[number] >= rules.least_support)
-    if clear.any() and stretch.burnt.any():
-        clear &= _burnt_share(stretch.burnt, stripe_row, half_px) <= BURNT_SHARE
-    return np.asarray(clear)
-
-
-@numba.njit(cache=True, nogil=True)
-def _burnt_share(burnt, stripe_row, half_px):  # type: ignore[no-untyped-def]
-    """Share of the rows of a window that are burnt, column by column; beyond the picture its outermost row counts."""
-    width, height = burnt.shape
-    share = np.zeros(width)
-    for x in range(width):
-        middle = int(np.rint(stripe_row[x]))
-        for row in range(middle - half_px, middle + half_px + 1):
-            share[x] += burnt[x, min(max(row, 0), height - 1)]
-    return share / (2 * half_px + 1)
-
-
 def evidence(stretch: Stretch, model: Model, rules: Rules, *, judged: bool = True) -> Evidence:
     """Return what all stripes say about the present path of both walls, and whether that surprises, if it is to be judged."""
-    width = stretch.columns.shape[0]
-    score, information, surprise = np.zeros((2, width)), np.zeros((2, width)), np.zeros((2, 2))
-    rows = model.layout.rows(stretch.displacement_px)
-    visible = model.layout.visible(rows, half_px=model.half_px)
-    seen = stretch.in_tone(model.tone)
-    for number, statistics in enumerate(model.stripes):
-        if statistics is None:
-            continue
-        wall = model.layout.wall[number]
-        clear = clear_columns(stretch, number, rows[number], visible[number], model.half_px, rules)
-        if not clear.any():
-            continue
-        heard = model.channels(seen.columns, rows[number], statistics.bank)
-        weight = softened(clear & believable(statistics.bank.power(heard), limits=rules.power_limits))
-        u = said(heard, weight, statistics.bank, band=model.band, length=model.length)
-        u = (u - statistics.mean_score) * statistics.trust
-        weight64 = weight.astype(np.float64)
-        score[wall] += weight64 * u
-        information[wall] += weight64 * statistics.trust * statistics.information
-        if judged:
-            power, columns = quiet_power(u[np.newaxis], weight64)
-            surprise[wall] += power[0, 0], columns * statistics.trust**2 * statistics.score_power
+    ear, seen = model.ear, stretch.in_tone(model.tone)
+    score, information = np.zeros((2, 2, seen.columns.shape[0]))
+    if not ear.number.size:
+        return Evidence(score, information, np.full(2, np.nan))
+    said, weight = heard(ear, seen, model.layout, least_support=rules.least_support, power_limits=rules.power_limits)
+    add_up(said, weight, ear.wall, ear.trust * ear.information, score, information)
+    return Evidence(score, information, _surprise(ear, said, weight) if judged else np.full(2, np.nan))
+
+
+def _surprise(ear: Ear, said: FloatArray, weight: Float32Array) -> FloatArray:
+    surprise = np.zeros((2, 2))
+    for i, wall in enumerate(ear.wall):
+        power, columns = quiet_power(said[i : i + 1], weight[i].astype(np.float64))
+        surprise[wall] += power[0, 0], columns * ear.trust[i] ** 2 * ear.score_power[i]
     with np.errstate(invalid="ignore", divide="ignore"):
-        return Evidence(score, information, surprise[:, 0] / surprise[:, 1])
+        return np.asarray(surprise[:, 0] / surprise[:, 1])
 
 
 def step(found: Evidence, cut: Cut, rules: Rules) -> FloatArray:
@@ -228,18 +168,68 @@ def step(found: Evidence, cut: Cut, rules: Rules) -> FloatArray:
     What both walls say together moves the groove in the direction of its cut, what they say against each other in the
     other one, slowly. Where one wall is silent it goes along with the other.
     """
-    smooth_px = _smoothing_px(found.information if cut == "stereo" else found.information.sum(axis=0), rules)
+    moved = np.zeros_like(found.score)
+    limits = (rules.smooth_px, rules.step_noise_px, rules.largest_step_px)
     if cut == "stereo":
-        return np.stack([_smoothed(found.score[w], found.information[w], smooth_px, rules) for w in (INNER, OUTER)])
-    sign = np.array([[1.0], [1.0]]) if cut == "lateral" else np.array([[-1.0], [1.0]])
-    common = _smoothed((sign * found.score).sum(axis=0), found.information.sum(axis=0), smooth_px, rules)
-    inner, outer = found.information
-    total = inner + outer
-    both = np.divide(inner * outer, total, out=np.zeros_like(total), where=total > 0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        each = np.where(found.information > 0, sign * found.score / found.information, 0.0)
-    against = _smoothed(both * (each[OUTER] - each[INNER]) / 2, both, rules.smooth_other_px, rules)
-    return np.asarray(sign * (common + np.array([[-1.0], [1.0]]) * against))
+        smooth_px = smoothing_px(found.information, limits)
+        for wall in (INNER, OUTER):
+            steps_of(found.score[wall], found.information[wall], smooth_px, rules.largest_step_px, moved[wall])
+    else:
+        _step_together(found.score, found.information, _sign_of(cut), limits, rules.smooth_other_px, moved)
+    return moved
+
+
+def _sign_of(cut: Cut) -> FloatArray:
+    """How the walls move when the groove moves in the direction of its cut."""
+    return np.array([1.0, 1.0] if cut == "lateral" else [-1.0, 1.0])
+
+
+@numba.njit(cache=True, nogil=True)
+def smoothing_px(information, limits):  # type: ignore[no-untyped-def]
+    """Return the σ of a Gaussian after which steps have the noise that the rules allow: 1/(2√π σ I) = noise²."""
+    least, noise, _ = limits
+    total, count = 0.0, 0
+    for value in information.flat:
+        if value > 0:
+            total += value
+            count += 1
+    usual = total / count if count else 0.0
+    wanted = 1 / (2 * np.sqrt(np.pi) * max(usual, 1e-9) * noise * noise)
+    return min(max(wanted, least), 2 * least)
+
+
+@numba.njit(cache=True, nogil=True)
+def steps_of(score, information, smooth_px, largest, out):  # type: ignore[no-untyped-def]
+    """Write smoothed score over smoothed information, none larger than allowed; 0 where nothing is known at all."""
+    most = information.max()
+    if most <= 0:
+        out[:] = 0.0
+        return
+    bottom = np.empty_like(information)
+    smooth(score, smooth_px, out)
+    smooth(information, smooth_px, bottom)
+    for x in range(out.size):
+        out[x] = min(max(out[x] / max(bottom[x], 0.05 * most), -largest), largest)
+
+
+@numba.njit(cache=True, nogil=True)
+def _step_together(score, information, sign, limits, smooth_other_px, moved):  # type: ignore[no-untyped-def]
+    width = score.shape[1]
+    inner, outer = information[INNER], information[OUTER]
+    total, said = np.empty(width), np.empty(width)
+    both, against = np.zeros(width), np.zeros(width)
+    for x in range(width):
+        one, other = sign[INNER] * score[INNER, x], sign[OUTER] * score[OUTER, x]
+        total[x], said[x] = inner[x] + outer[x], one + other
+        if inner[x] > 0 and outer[x] > 0:
+            both[x] = inner[x] * outer[x] / total[x]
+            against[x] = both[x] * (other / outer[x] - one / inner[x]) / 2
+    common, apart = np.empty(width), np.empty(width)
+    steps_of(said, total, smoothing_px(total, limits), limits[2], common)
+    steps_of(against, both, smooth_other_px, limits[2], apart)
+    for x in range(width):
+        moved[INNER, x] = sign[INNER] * (common[x] - apart[x])
+        moved[OUTER, x] = sign[OUTER] * (common[x] + apart[x])
 
 
 def settled(displacement_px: FloatArray, support: FloatArray, cut: Cut, rules: Rules) -> FloatArray:
@@ -252,54 +242,15 @@ def settled(displacement_px: FloatArray, support: FloatArray, cut: Cut, rules: R
     """
     if cut == "stereo":
         return displacement_px
-    sign = np.array([[1.0], [1.0]]) if cut == "lateral" else np.array([[-1.0], [1.0]])
+    sign = _sign_of(cut)[:, np.newaxis]
     signed = sign * displacement_px
     weight = support**2 + 1e-4
     inner, outer = weight
     both = inner * outer / (inner + outer)
-    apart = gaussian(both * (signed[OUTER] - signed[INNER]) / 2, rules.smooth_other_px)
-    apart = apart / gaussian(both, rules.smooth_other_px)
+    apart = smoothed(both * (signed[OUTER] - signed[INNER]) / 2, rules.smooth_other_px)
+    apart = apart / smoothed(both, rules.smooth_other_px)
     middle = (weight * (signed + np.array([[1.0], [-1.0]]) * apart)).sum(axis=0) / weight.sum(axis=0)
     return np.asarray(sign * (middle + np.array([[-1.0], [1.0]]) * apart))
-
-
-def _smoothing_px(information: FloatArray, rules: Rules) -> float:
-    """Standard deviation of a Gaussian after which steps have the noise that the rules allow: 1/(2√π σ I) = noise²."""
-    usual = float(np.median(information[information > 0])) if (information > 0).any() else 0.0
-    wanted = 1 / (2 * np.sqrt(np.pi) * max(usual, 1e-9) * rules.step_noise_px**2)
-    return float(np.clip(wanted, rules.smooth_px, 2 * rules.smooth_px))
-
-
-def gaussian(values: FloatArray, sigma: float) -> FloatArray:
-    """Return rows smoothed by a Gaussian that is cut off at four σ; beyond the ends the last value is held.
-
-    Parameters
-    ----------
-    values : float64 array, shape (…, column)
-    sigma : float
-        Columns.
-    """
-    radius, width = int(4 * sigma + 0.5), values.shape[-1]
-    held = np.concatenate(
-        [np.repeat(values[..., :1], radius, axis=-1), values, np.repeat(values[..., -1:], radius, axis=-1)], axis=-1
-    )
-    length = fft.next_fast_len(held.shape[-1], real=True)
-    smooth = fft.irfft(fft.rfft(held, length) * _bell_spectrum(sigma, radius, length), length)
-    return np.asarray(smooth[..., 2 * radius : 2 * radius + width])
-
-
-@lru_cache(maxsize=64)
-def _bell_spectrum(sigma: float, radius: int, length: int) -> npt.NDArray[np.complex128]:
-    bell = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
-    return np.asarray(fft.rfft(bell / bell.sum(), length))
-
-
-def _smoothed(score: FloatArray, information: FloatArray, smooth_px: float, rules: Rules) -> FloatArray:
-    most = float(information.max(initial=0.0))
-    if most == 0:
-        return np.zeros_like(score)
-    top, bottom = gaussian(np.stack([score, information]), smooth_px)
-    return np.asarray(np.clip(top / np.maximum(bottom, 0.05 * most), -rules.largest_step_px, rules.largest_step_px))
 
 
 def read(stretch: Stretch, models: Sequence[Model], cut: Cut, rules: Rules) -> tuple[Stretch, Evidence]:

@@ -87,8 +87,8 @@ def _scale(w, values, out):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _filter(rows, half_taps, out):  # type: ignore[no-untyped-def]
-    """Filter along the columns by taps given from their middle on, an even number beyond it."""
+def filter_columns(rows, half_taps, out):  # type: ignore[no-untyped-def]
+    """Filter along the columns by taps given from their middle on, an even number beyond it; see `filtered`."""
     width, n = rows.shape
     half = half_taps.size - 1
     wide = np.empty((width + 2 * half, n), np.float32)
@@ -127,12 +127,15 @@ def filtered(rows: Float32Array, taps: FloatArray) -> Float32Array:
     taps : float64 array
         An odd number of them.
     """
-    half_taps = taps[taps.size // 2 :].astype(np.float32)
-    if half_taps.size % 2 == 0:
-        half_taps = np.append(half_taps, np.float32(0))
     out = np.empty(rows.shape, np.float32)
-    _filter(rows, half_taps, out)
+    filter_columns(rows, half_of(taps), out)
     return out
+
+
+def half_of(taps: FloatArray) -> Float32Array:
+    """Return a symmetric filter from its middle on, with an even number of taps beyond it."""
+    half_taps = taps[taps.size // 2 :].astype(np.float32)
+    return half_taps if half_taps.size % 2 else np.append(half_taps, np.float32(0))
 
 
 @dataclass(eq=False)

@@ -26,6 +26,7 @@ from gramoscope.pickup.texture.filter_bank import (
     witness_forms,
 )
 from gramoscope.pickup.texture.following import REACH, SHARP, across, wide_rows
+from gramoscope.pickup.texture.hearing import clear_columns
 from gramoscope.pickup.texture.likelihood import (
     StripeStatistics,
     believable,
@@ -34,8 +35,9 @@ from gramoscope.pickup.texture.likelihood import (
     said,
     softened,
 )
-from gramoscope.pickup.texture.reading import Model, Rules, Stretch, clear_columns
+from gramoscope.pickup.texture.reading import Model, Rules
 from gramoscope.pickup.texture.spectrum import CrossSpectra, cross_spectra, precision
+from gramoscope.pickup.texture.stretch import Stretch
 
 LEAST_WEIGHT = 100.0
 """Columns of a stretch; with fewer it teaches nothing."""
@@ -75,10 +77,14 @@ class StripeMaterial:
 
     def clear(self, stretch: Stretch) -> tuple[FloatArray, BoolArray]:
         """Return where the stripe runs, and in which columns it can be seen."""
-        rows = self.model.layout.rows(stretch.displacement_px)
-        seen = self.model.layout.visible(rows, half_px=self.model.half_px)[self.number]
-        row = rows[self.number]
-        return row, clear_columns(stretch, self.number, row, seen, self.model.half_px, self.rules)
+        rows, clear = clear_columns(
+            stretch,
+            self.model.layout,
+            np.array([self.number]),
+            half_px=self.model.half_px,
+            least_support=self.rules.least_support,
+        )
+        return rows[0], clear[0]
 
     def sums(self, before: StripeStatistics | None) -> list[CrossSpectra]:
         """Return the cross-spectra of all stretches without each fold, and of all of them."""

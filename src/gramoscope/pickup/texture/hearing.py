@@ -1,0 +1,257 @@
+"""All stripes of a stretch heard at once: from its picture and a path to what every column says, in a few kernels.
+
+The steps are those of `following`, `spectrum`, `filter_bank` and `likelihood`, which learning takes one by one. Reading takes
+them hundreds of times a second, and there what lies between the steps would cost as much as they do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from scipy import fft
+
+from gramoscope.conventions import BoolArray, Float32Array, FloatArray, IntArray
+from gramoscope.pickup.texture.filter_bank import energies, let_through
+from gramoscope.pickup.texture.following import BLOCK, REACH, TAPS_OF_PHASES, follow_rows, padded_rows, wide_rows
+from gramoscope.pickup.texture.layout import StripeLayout
+from gramoscope.pickup.texture.likelihood import (
+    LOUDNESS_BELL,
+    TAPER,
+    TEMPER,
+    TEXTURE_PX,
+    StripeStatistics,
+    soften,
+    temper,
+    within,
+)
+from gramoscope.pickup.texture.spectrum import Band, filter_columns, half_of
+from gramoscope.pickup.texture.stretch import Stretch
+
+BURNT_SHARE = 0.15
+"""Of the rows of a window in one column: a bright grain or two do no harm, a scratch does."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ear:
+    """The stripes of a model that can be read, laid together.
+
+    Attributes
+    ----------
+    number : int64 array, shape (stripe,)
+        Which of the layout's stripes these are.
+    wall : int64 array, shape (stripe,)
+    basis : float32 array, shape (stripe, row, channel)
+        Rows as `following` pads them.
+    usual : float32 array, shape (stripe, channel, channel)
+    filters : float32 array, shape (stripe, bin in the band, filter, channel)
+    sign : float32 array, shape (stripe, filter)
+    mean_score, trust, information, score_power : float64 arrays, shape (stripe,)
+        See `likelihood.StripeStatistics`.
+    half_taps : float32 array
+        Of the whitener, from its middle on.
+    half_px : int
+    band : Band
+    length : int
+        Of the transforms.
+    """
+
+    number: IntArray
+    wall: IntArray
+    basis: Float32Array
+    usual: Float32Array
+    filters: Float32Array
+    sign: Float32Array
+    mean_score: FloatArray
+    trust: FloatArray
+    information: FloatArray
+    score_power: FloatArray
+    half_taps: Float32Array
+    half_px: int
+    band: Band
+    length: int
+
+
+def ear_of(
+    stripes: Sequence[StripeStatistics | None],
+    wall: IntArray,
+    whitener: FloatArray,
+    *,
+    half_px: int,
+    band: Band,
+    length: int,
+) -> Ear:
+    """Return the ear of stripes with these statistics; None for those that are not to be read."""
+    known = [(number, one) for number, one in enumerate(stripes) if one is not None]
+    number = np.array([n for n, _ in known], np.int64)
+    channels = max((one.bank.basis.shape[1] for _, one in known), default=0)
+    basis = np.zeros((len(known), padded_rows(wide_rows(half_px)), channels), np.float32)
+    for i, (_, one) in enumerate(known):
+        basis[i, : one.bank.basis.shape[0]] = one.bank.basis
+    banks = [one.bank for _, one in known]
+    return Ear(
+        number,
+        wall[number],
+        basis,
+        _stacked([bank.usual for bank in banks], 2),
+        _stacked([bank.filters for bank in banks], 3),
+        _stacked([bank.sign for bank in banks], 1),
+        np.array([one.mean_score for _, one in known]),
+        np.array([one.trust for _, one in known]),
+        np.array([one.information for _, one in known]),
+        np.array([one.score_power for _, one in known]),
+        half_of(whitener),
+        half_px,
+        band,
+        length,
+    )
+
+
+def _stacked(arrays: list[Float32Array], axes: int) -> Float32Array:
+    return np.ascontiguousarray(np.stack(arrays)) if arrays else np.zeros((0,) * (axes + 1), np.float32)
+
+
+def clear_columns(
+    stretch: Stretch, layout: StripeLayout, number: IntArray, *, half_px: int, least_support: float
+) -> tuple[FloatArray, BoolArray]:
+    """Return where stripes run, and in which columns they are there and can be seen whole.
+
+    Parameters
+    ----------
+    stretch : Stretch
+    layout : StripeLayout
+    number : int64 array, shape (stripe,)
+        Which of its stripes.
+    half_px : int
+        Of the windows.
+    least_support : float
+        Sharpness without which a stripe is not there.
+
+    Returns
+    -------
+    rows : float64 array, shape (stripe, column)
+    clear : bool array, shape (stripe, column)
+        Where a stripe is sharp, in its half of the picture, seen by enough frames and not burnt.
+    """
+    rows = layout.rows(stretch.displacement_px)
+    clear = layout.visible(rows, half_px=half_px)[number]
+    rows = rows[number]
+    _clear(stretch.usable, stretch.burnt, stretch.support[number], rows, half_px, least_support, BURNT_SHARE, clear)
+    return rows, clear
+
+
+@numba.njit(cache=True, nogil=True)
+def _clear(usable, burnt, support, rows, half_px, least_support, burnt_share, clear):  # type: ignore[no-untyped-def]
+    """Take away what is not usable, has no support, or is burnt; beyond the picture its outermost row counts."""
+    height = burnt.shape[1]
+    for i in range(rows.shape[0]):
+        for x in range(usable.size):
+            clear[i, x] &= usable[x] and support[i, x] >= least_support
+            if clear[i, x] and height:
+                middle, spoilt = int(np.rint(rows[i, x])), 0
+                for row in range(middle - half_px, middle + half_px + 1):
+                    spoilt += burnt[x, min(max(row, 0), height - 1)]
+                clear[i, x] = spoilt <= burnt_share * (2 * half_px + 1)
+
+
+@numba.njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
+def _square(values):  # type: ignore[no-untyped-def]
+    total = np.float32(0)
+    for c in range(values.size):
+        total += values[c] * values[c]
+    return total
+
+
+@numba.njit(cache=True, nogil=True)
+def _scaled(values, share, out):  # type: ignore[no-untyped-def]
+    for c in range(out.size):
+        out[c] = values[c] * share
+
+
+@numba.njit(cache=True, nogil=True)
+def _draw(columns, rows, clear, half_px, half_taps, basis, usual, limits, drawn, weight):  # type: ignore[no-untyped-def]
+    """Write the whitened channels of each stripe, times their weight, and the weight."""
+    stripes, _, channels = drawn.shape
+    width = columns.shape[0]
+    blocks = -(-width // BLOCK)
+    window = np.zeros((blocks * BLOCK, basis.shape[1]), np.float32)
+    raw = np.empty((blocks * BLOCK, channels), np.float32)
+    white, power = np.empty((width, channels), np.float32), np.empty(width, np.float32)
+    seen, valid = np.empty((BLOCK, channels), np.float32), np.empty(width, np.bool_)
+    for i in range(stripes):
+        drawn[i, width:] = np.float32(0)
+        if not clear[i].any():
+            drawn[i], weight[i] = np.float32(0), np.float32(0)
+            continue
+        follow_rows(columns, rows[i], TAPS_OF_PHASES, half_px + REACH, window[:width])
+        # in small blocks, which no library spreads over threads of its own
+        for k in range(blocks):
+            part = slice(k * BLOCK, (k + 1) * BLOCK)
+            np.dot(window[part], basis[i], raw[part])
+        filter_columns(raw[:width], half_taps, white)
+        for k in range(blocks):
+            first, stop = k * BLOCK, min((k + 1) * BLOCK, width)
+            np.dot(white[first:stop], usual[i], seen[: stop - first])
+            for x in range(first, stop):
+                power[x] = _square(seen[x - first])
+        within(power, TEXTURE_PX // 2, limits[0], limits[1], valid)
+        valid &= clear[i]
+        soften(valid, TAPER, weight[i])
+        for x in range(width):
+            _scaled(white[x], weight[i, x], drawn[i, x])
+
+
+@numba.njit(cache=True, nogil=True)
+def _say(p, sign, mean, trust, said):  # type: ignore[no-untyped-def]
+    stripes, width = said.shape
+    score, loudness = np.empty(width, np.float32), np.empty(width, np.float32)
+    for i in range(stripes):
+        energies(p[i], sign[i], score, loudness)
+        temper(score, loudness, LOUDNESS_BELL, TEMPER, said[i])
+        for x in range(width):
+            said[i, x] = (said[i, x] - mean[i]) * trust[i]
+
+
+@numba.njit(cache=True, nogil=True)
+def add_up(said, weight, wall, information, score, sum_of_information):  # type: ignore[no-untyped-def]
+    """Add what stripes say to their walls, [wall, column], and how much they know, by their weight."""
+    for i in range(wall.size):
+        for x in range(said.shape[1]):
+            score[wall[i], x] += said[i, x] * weight[i, x]
+            sum_of_information[wall[i], x] += information[i] * weight[i, x]
+
+
+def heard(
+    ear: Ear, stretch: Stretch, layout: StripeLayout, *, least_support: float, power_limits: tuple[float, float]
+) -> tuple[FloatArray, Float32Array]:
+    """Return what the stripes say of their paths.
+
+    Parameters
+    ----------
+    ear : Ear
+    stretch : Stretch
+        In the tone of the model.
+    layout : StripeLayout
+    least_support : float
+        See `clear_columns`.
+    power_limits : (float, float)
+        Of the texture, in units of its usual power.
+
+    Returns
+    -------
+    said : float64 array, shape (stripe, column)
+        Score without its mean, times trust.
+    weight : float32 array, shape (stripe, column)
+        0 … 1.
+    """
+    rows, clear = clear_columns(stretch, layout, ear.number, half_px=ear.half_px, least_support=least_support)
+    drawn = np.empty((len(rows), ear.length, ear.basis.shape[2]), np.float32)
+    weight, said = np.empty(rows.shape, np.float32), np.empty(rows.shape)
+    _draw(stretch.columns, rows, clear, ear.half_px, ear.half_taps, ear.basis, ear.usual, power_limits, drawn, weight)
+    spectrum = fft.rfft(drawn, axis=1)
+    through = np.zeros((len(rows), ear.sign.shape[1], spectrum.shape[1]), np.complex64)
+    let_through(spectrum, ear.filters, ear.band.bins(ear.length).start, through)
+    _say(fft.irfft(through, ear.length), ear.sign, ear.mean_score, ear.trust, said)
+    return said, weight

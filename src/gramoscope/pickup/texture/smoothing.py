@@ -1,0 +1,62 @@
+"""Smoothing along the groove: nearly a Gaussian, at the same cost for any width.
+
+Three running means one after the other are a Gaussian to 7 % of its peak (P. Kovesi, Fast almost-Gaussian filtering, DICTA
+2010): their widths are odd numbers whose variances, (w² − 1)/12 each, add up to σ² as nearly as odd numbers can.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from gramoscope.conventions import FloatArray
+
+PASSES = 3
+
+
+@numba.njit(cache=True, nogil=True)
+def half_widths(sigma: float) -> tuple[int, int, int]:
+    """Return the half widths of three running means that together have about the standard deviation σ."""
+    narrow = int(np.sqrt(12 * sigma * sigma / PASSES + 1))
+    narrow -= 1 - narrow % 2
+    # so many of the three are narrow, the rest two columns wider
+    count = int(np.rint((12 * sigma * sigma - PASSES * (narrow * narrow + 4 * narrow + 3)) / (-4 * narrow - 4)))
+    near, far = (narrow - 1) // 2, (narrow + 1) // 2
+    return near if count > 0 else far, near if count > 1 else far, near if count > 2 else far
+
+
+@numba.njit(cache=True, nogil=True)
+def _running_mean(values, half, out):  # type: ignore[no-untyped-def]
+    width = values.size
+    total = (half + 1) * values[0]
+    for x in range(1, half + 1):
+        total += values[min(x, width - 1)]
+    share = 1 / (2 * half + 1)
+    for x in range(width):
+        out[x] = total * share
+        total += values[min(x + half + 1, width - 1)] - values[max(x - half, 0)]
+
+
+@numba.njit(cache=True, nogil=True)
+def smooth(values, sigma, out):  # type: ignore[no-untyped-def]
+    """Write one row smoothed; see `smoothed`."""
+    first, second, third = half_widths(sigma)
+    between = np.empty_like(values)
+    _running_mean(values, first, out)
+    _running_mean(out, second, between)
+    _running_mean(between, third, out)
+
+
+def smoothed(values: FloatArray, sigma: float) -> FloatArray:
+    """Return a row smoothed by about a Gaussian; beyond the ends each running mean holds the last value.
+
+    Parameters
+    ----------
+    values : float64 array, shape (column,)
+        A NaN spreads to all that follows it.
+    sigma : float
+        Standard deviation, columns.
+    """
+    out = np.empty_like(values)
+    smooth(values, sigma, out)
+    return out

@@ -1,0 +1,49 @@
+"""One stretch of groove on its way through the reading: its picture, and where its walls are believed to run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from gramoscope.conventions import BoolArray, Float32Array, FloatArray
+from gramoscope.pickup.texture.tone import Tone
+
+AS_IT_IS = Tone()
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A stretch laid ready for reading.
+
+    Attributes
+    ----------
+    columns : float32 array, shape (column, row)
+        The registered picture, transposed.
+    usable : bool array, shape (column,)
+        Columns that rest on enough frames.
+    burnt : bool array, shape (column, row)
+        Places at full scale; of no rows at all when there are none.
+    displacement_px : float64 array, shape (2, column)
+        The present path of each wall.
+    support : float64 array, shape (stripe, column)
+        How sharp the coarse search found each stripe.
+    tone : Tone
+        In which the picture is seen: before it is interpolated, for bright grains ring less then.
+    """
+
+    columns: Float32Array
+    usable: BoolArray
+    burnt: BoolArray
+    displacement_px: FloatArray
+    support: FloatArray
+    tone: Tone = AS_IT_IS
+
+    def in_tone(self, tone: Tone) -> Stretch:
+        """Return the same stretch seen in a tone; only a picture that is as it was can be seen in another one."""
+        if tone == self.tone or tone.compression == self.tone.compression == 0:
+            return self
+        assert self.tone.compression == 0
+        return replace(self, columns=tone(self.columns), tone=tone)
+
+    def moved(self, step_px: FloatArray) -> Stretch:
+        """Return the same stretch with its paths moved, shape (2, column)."""
+        return replace(self, displacement_px=self.displacement_px + step_px)

@@ -1,0 +1,36 @@
+"""Smoothing by running means is nearly smoothing by a Gaussian."""
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from gramoscope.pickup.texture.smoothing import half_widths, smoothed
+
+VALUES = np.cumsum(np.random.default_rng(2).normal(size=800)) + 3
+
+
+@pytest.mark.parametrize("sigma", [2.6, 12.0, 17.3, 24.0, 200.0])
+def test_three_running_means_are_nearly_a_gaussian(sigma: float) -> None:
+    impulse = np.zeros(6001)
+    impulse[3000] = 1.0
+    answer = smoothed(impulse, sigma)
+    place = np.arange(-3000, 3001)
+    assert answer.sum() == pytest.approx(1.0)
+    assert answer @ place == pytest.approx(0.0, abs=1e-9)
+    variance = answer @ place**2
+    assert variance == pytest.approx(sum(((2 * h + 1) ** 2 - 1) / 12 for h in half_widths(sigma)))
+    assert np.sqrt(variance) == pytest.approx(sigma, rel=0.025, abs=0.2)
+    bell = np.exp(-0.5 * place**2 / variance)
+    assert np.abs(answer - bell / bell.sum()).max() < 0.075 / (np.sqrt(2 * np.pi) * sigma)
+
+
+@pytest.mark.parametrize("sigma", [12.0, 200.0])
+def test_beyond_the_ends_the_last_value_is_held(sigma: float) -> None:
+    gaussian = ndimage.gaussian_filter1d(VALUES, sigma, mode="nearest")
+    assert np.std(smoothed(VALUES, sigma) - gaussian) < 0.03 * np.std(VALUES)
+    np.testing.assert_allclose(smoothed(np.full(50, 7.3), sigma), 7.3)
+    np.testing.assert_allclose(smoothed(VALUES[::-1].copy(), sigma), smoothed(VALUES, sigma)[::-1], atol=1e-9)
+
+
+def test_what_is_narrower_than_a_column_stays_as_it_is() -> None:
+    np.testing.assert_allclose(smoothed(VALUES, 0.2), VALUES)
