@@ -23,11 +23,10 @@ from benchmarks.speed.ceilings import Ceilings, measured_ceilings, seconds
 from gramoscope.apparatus.capture import Capture, open_capture
 from gramoscope.camera.exposure import EVERY_ROW
 from gramoscope.disc.formats import direction_of_cut
-from gramoscope.pickup.overlay import overlay
 from gramoscope.pickup.registration import frame_shifts
-from gramoscope.pickup.texture.reading import evidence, step
+from gramoscope.pickup.texture.reading import read
 from gramoscope.pickup.texture.sharpness import sharpness
-from gramoscope.pickup.texture_likelihood import TexturePickup, laid_out, samples_of
+from gramoscope.pickup.texture_likelihood import TexturePickup, samples_of, sight_of
 from gramoscope.player.play import learned
 from gramoscope.player.recipe import load_recipe
 from gramoscope.preamp.resample import Resampler
@@ -53,31 +52,25 @@ def filmed_capture(folder: Path, groups: int) -> Capture:
 def reading_stages(pickup: TexturePickup, group: FrameGroup) -> list[Row]:
     """Time the stages of reading one stretch."""
     film = float(group.images.nbytes)
-    shift, _ = frame_shifts(group)
-    index = np.arange(len(shift))
-    laid = overlay(group.images, shift, index)
-    columns, usable, burnt = laid_out(laid, group.white_level)
-    cartridge = pickup.cartridge
+    sight = sight_of(group)
+    coarse = pickup.searched(sight)
+    begun, laid = pickup.stretch(group, sight, coarse)
+    cartridge, models = pickup.cartridge, pickup.models_for(group.number)
     cut, rules = cartridge.bench.disc.cut, cartridge.rules
-    sharp = sharpness(columns)
-    model = pickup.lessons[-1].whole
-    seen = pickup.stretch(columns, usable, burnt).in_tone(model.tone)
-    found = evidence(seen, model, rules)
-
-    def rounds() -> None:
-        for _ in range(cartridge.rounds):
-            step(evidence(seen, model, rules, judged=False), cut, rules)
-        evidence(seen, model, rules)
-
+    path, found = read(begun, models, cut, rules)
+    drawn = float(np.count_nonzero(laid.columns)) * len(sight.shift_px) * group.images.itemsize
     return [
         ("frames that show nothing", seconds(lambda: cartridge.exposure.sort_out(group)), film / EVERY_ROW),
         ("how far the record turned", seconds(lambda: frame_shifts(group)), 0.0),
-        ("frames laid over each other", seconds(lambda: overlay(group.images, shift, index)), film),
-        ("sharpness", seconds(lambda: sharpness(columns)), 0.0),
-        ("coarse search", seconds(lambda: cartridge.search.find(sharp, pickup.layout, cut=cut)), 0.0),
-        ("tone", seconds(lambda: model.tone(columns)), 0.0),
-        (f"likelihood, {cartridge.rounds} rounds and what they come to", seconds(rounds), 0.0),
-        ("samples", seconds(lambda: samples_of(seen, found)), 0.0),
+        ("sharpness", seconds(lambda: sharpness(group.images, sight.shift_px)), film),
+        ("coarse search", seconds(lambda: pickup.searched(sight)), 0.0),
+        ("frames laid over each other about the stripes", seconds(lambda: pickup.stretch(group, sight, coarse)), drawn),
+        (
+            f"likelihood, {cartridge.rounds} rounds and what they come to",
+            seconds(lambda: read(begun, models, cut, rules)),
+            0.0,
+        ),
+        ("samples", seconds(lambda: samples_of(path, found)), 0.0),
         ("strips for the splice", seconds(lambda: pickup.strips(laid, group)), 0.0),
         ("reading, one thread, whole", seconds(lambda: pickup.read(group)), film),
     ]

@@ -63,6 +63,11 @@ class FrameGroup:
     valid: npt.NDArray[np.bool_]
     problems: tuple[str, ...] = ()
 
+    @property
+    def usable_images(self) -> ImageArray:
+        """The valid frames; a view when all are."""
+        return self.images if self.valid.all() else self.images[self.valid]
+
 
 @dataclass(frozen=True, eq=False)
 class Texture:

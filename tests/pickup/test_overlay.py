@@ -2,21 +2,22 @@
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
-from gramoscope.pickup.overlay import BLOCK_ROWS, overlay
+from gramoscope.pickup.overlay import TILE_COLUMNS, TILE_ROWS, all_tiles, overlay, slope_along, tiles_about
 from gramoscope.pickup.registration import register
 
 SHIFT_PX = np.array([0.0, 2.3, 3.9, 6.75])
 NUMBER = np.array([0, 1, 3, 4])
 
 
-def _film(dtype: type = np.uint8, *, height: int = 2 * BLOCK_ROWS + 5) -> np.ndarray:
+def _film(dtype: type = np.uint8, *, height: int = 2 * TILE_ROWS + 5) -> np.ndarray:
     rng = np.random.default_rng(6)
     return rng.integers(3, np.iinfo(dtype).max - 3, (4, height, 61)).astype(dtype)
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
-@pytest.mark.parametrize("height", [1, BLOCK_ROWS, 2 * BLOCK_ROWS + 5])
+@pytest.mark.parametrize("height", [1, TILE_ROWS, 2 * TILE_ROWS + 5])
 def test_the_mean_is_that_of_the_canvas(dtype: type, height: int) -> None:
     images = _film(dtype, height=height)
     laid, canvas = overlay(images, SHIFT_PX, NUMBER), register(images, SHIFT_PX, NUMBER)
@@ -41,3 +42,45 @@ def test_the_film_stays_as_it_was() -> None:
     images.flags.writeable = False
     overlay(images, SHIFT_PX, NUMBER)
     np.testing.assert_array_equal(images, before)
+
+
+@pytest.mark.parametrize("width", [61, 5 * TILE_COLUMNS + 3])
+def test_only_what_is_wanted_is_drawn(width: int) -> None:
+    rng = np.random.default_rng(4)
+    images = rng.integers(3, 250, (4, 5 * TILE_ROWS + 2, width)).astype(np.uint8)
+    whole = overlay(images, SHIFT_PX, NUMBER).columns
+    wanted = rng.uniform(size=all_tiles(whole.shape[::-1]).shape) < 0.5
+    drawn = overlay(images, SHIFT_PX, NUMBER, wanted).columns
+    inside = wanted.repeat(TILE_ROWS, axis=0).repeat(TILE_COLUMNS, axis=1)[: whole.shape[1], : whole.shape[0]].T
+    # what no frame covers repeats its neighbour, drawn or not
+    middle = slice(1, -2)
+    np.testing.assert_array_equal(drawn[middle], np.where(inside, whole, 0)[middle])
+    assert 0.2 < inside.mean() < 0.8
+
+
+def test_tiles_lie_about_the_lines_that_are_wanted() -> None:
+    shape = (10 * TILE_ROWS, 4 * TILE_COLUMNS)
+    column = np.arange(shape[1])
+    lines = np.array([40.0 + 0.2 * column, np.full(shape[1], 148.0)])
+    lines[1, : 2 * TILE_COLUMNS + 10] = np.nan
+    wanted = tiles_about(lines, shape, reach_px=9.0)
+    inside = wanted.repeat(TILE_ROWS, axis=0).repeat(TILE_COLUMNS, axis=1)
+    row = np.arange(shape[0])[:, None]
+    near = (np.abs(row - lines[:, None, :]) <= 9.0).any(axis=0)
+    assert inside[near].all()
+    # no tile without need, but for the corners that a line cuts
+    assert wanted.sum() <= np.count_nonzero(near.reshape(10, TILE_ROWS, 4, TILE_COLUMNS).any(axis=(1, 3)))
+    assert not tiles_about(lines - 1e4, shape, reach_px=9.0).any()
+    assert not tiles_about(np.full((1, shape[1]), np.nan), shape, reach_px=9.0).any()
+
+
+def test_the_slope_along_the_groove_is_that_of_a_gaussian() -> None:
+    rng = np.random.default_rng(3)
+    columns = rng.normal(size=(90, 7)).astype(np.float32)
+    expected = ndimage.gaussian_filter1d(columns, 1.0, axis=0, order=1, mode="nearest").T
+    found = slope_along(columns)
+    assert found.shape == (7, 90)
+    assert found.flags.c_contiguous
+    np.testing.assert_allclose(found, expected, atol=0.01 * expected.std())
+    ramp = np.tile(3.0 * np.arange(40.0), (5, 1)).T.astype(np.float32)
+    np.testing.assert_allclose(slope_along(ramp)[:, 4:-4], 3.0, rtol=1e-6)

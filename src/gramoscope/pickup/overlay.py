@@ -2,7 +2,8 @@
 
 What `registration.register` gives beside its trend, for readings that need no temporal derivative: every byte of the film is
 read once, each frame at its own fraction of a pixel (Catmull–Rom), and a column of the mean lies together in memory, as
-windows that follow the groove want it.
+windows that follow the groove want it. Only the parts of the picture that somebody wants are drawn: most of it is out of
+focus.
 """
 
 from __future__ import annotations
@@ -13,12 +14,14 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from gramoscope.conventions import Float32Array, FloatArray
-from gramoscope.pickup.registration import cubic_taps, frame_shifts, placement, widen
-from gramoscope.signal_path import FrameGroup, ImageArray
+from gramoscope.conventions import BoolArray, Float32Array, FloatArray
+from gramoscope.pickup.registration import cubic_taps, placement
+from gramoscope.signal_path import ImageArray
 
-BLOCK_ROWS = 16
-"""So many rows are averaged before they are written: a cache line of each column."""
+TILE_ROWS, TILE_COLUMNS = 16, 64
+"""So much of the picture is wanted or not. Sixteen rows are averaged before they are written: a cache line of each column."""
+RUN_TILES = 4
+"""So many tiles at most are averaged at a time: what they add up to stays near."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +31,7 @@ class Overlay:
     Attributes
     ----------
     columns : float32 array, shape (column, row)
-        Grey levels, in the coordinates of the first frame, extended forward by the last shift.
+        Grey levels, in the coordinates of the first frame, extended forward by the last shift; 0 where not wanted.
     frames : int64 array, shape (column,)
         How many frames each column rests on.
     shift_px : float64 array, shape (frame,)
@@ -44,42 +47,109 @@ class Overlay:
 
 
 @numba.njit(cache=True, nogil=True, fastmath={"contract"})
-def _add(before, here, after, beyond, taps, total):  # type: ignore[no-untyped-def]
-    w0, w1, w2, w3 = taps
-    w0, w1, w2, w3 = np.float32(w0), np.float32(w1), np.float32(w2), np.float32(w3)
-    for x in range(total.size):
-        total[x] += w0 * before[x] + w1 * here[x] + w2 * after[x] + w3 * beyond[x]
+def _add_frame(film, first, stride, taps, start, stop, total):  # type: ignore[no-untyped-def]
+    """Add one frame, of a film as one line of pixels, to the columns from start to stop of [row, column]."""
+    w0, w1, w2, w3 = np.float32(taps[0]), np.float32(taps[1]), np.float32(taps[2]), np.float32(taps[3])
+    into = total.reshape(total.size)
+    # unsigned places, for signed ones may count from the end, and keep the loop from being vectorised
+    one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
+    for j in range(total.shape[0]):
+        here, there = np.uint64(first + j * stride), np.uint64(j * total.shape[1] + start)
+        for x in range(np.uint64(stop - start)):
+            near = w0 * np.float32(film[here + x]) + w1 * np.float32(film[here + x + one])
+            into[there + x] += near + w2 * np.float32(film[here + x + two]) + w3 * np.float32(film[here + x + three])
 
 
 @numba.njit(cache=True, nogil=True)
-def _write(total, share, first, rows, columns):  # type: ignore[no-untyped-def]
-    for x in range(total.shape[1]):
+def _write(total, share, first, columns):  # type: ignore[no-untyped-def]
+    """Write rows of sums as columns of means."""
+    rows = total.shape[0]
+    for x in range(columns.shape[0]):
         column = columns[x, first : first + rows]
         for j in range(rows):
             column[j] = total[j, x] * share[x]
 
 
 @numba.njit(cache=True, nogil=True)
-def _overlay(images, shift_px, share, columns):  # type: ignore[no-untyped-def]
-    frames, height, width = images.shape
-    canvas_width = columns.shape[0]
-    wide = np.empty(width, np.float32)
-    total = np.empty((BLOCK_ROWS, canvas_width), np.float32)
-    for first in range(0, height, BLOCK_ROWS):
-        rows = min(BLOCK_ROWS, height - first)
-        total[:] = np.float32(0)
-        for k in range(frames):
-            start, stop, offset, fraction = placement(shift_px[k], width, canvas_width)
-            taps = cubic_taps(fraction)
-            for j in range(rows):
-                widen(images[k, first + j], wide)
-                # slices, for an index that may be negative keeps the loop from being vectorised
-                row = wide[start + offset - 1 : stop + offset + 2]
-                _add(row[:-3], row[1:-2], row[2:-1], row[3:], taps, total[j, start:stop])
-        _write(total, share, first, rows, columns)
+def _overlay_run(film, shape, shift_px, share, rows, run, total, columns):  # type: ignore[no-untyped-def]
+    """Average some rows of a run of columns."""
+    frames, height, width = shape
+    first, stop_row = rows
+    left, right = run
+    part = total[: stop_row - first]
+    part[:] = np.float32(0)
+    for k in range(frames):
+        start, stop, offset, fraction = placement(shift_px[k], width, columns.shape[0])
+        start, stop = max(start, left), min(stop, right)
+        if stop > start:
+            pixel = (k * height + first) * width + start + offset - 1
+            _add_frame(film, pixel, width, cubic_taps(fraction), start - left, stop - left, part)
+    _write(part, share[left:right], first, columns[left:right])
 
 
-def overlay(images: ImageArray, shift_px: FloatArray, frame_index: npt.NDArray[np.int64]) -> Overlay:
+@numba.njit(cache=True, nogil=True)
+def _overlay(film, shape, shift_px, share, wanted, columns):  # type: ignore[no-untyped-def]
+    tiles = wanted.shape[1]
+    total = np.empty((TILE_ROWS, RUN_TILES * TILE_COLUMNS), np.float32)
+    for block in range(wanted.shape[0]):
+        rows = (block * TILE_ROWS, min((block + 1) * TILE_ROWS, shape[1]))
+        tile = 0
+        while tile < tiles:
+            first = tile
+            while tile < min(tiles, first + RUN_TILES) and wanted[block, tile]:
+                tile += 1
+            if tile > first:
+                run = (first * TILE_COLUMNS, min(tile * TILE_COLUMNS, columns.shape[0]))
+                _overlay_run(film, shape, shift_px, share, rows, run, total, columns)
+            else:
+                tile += 1
+
+
+def all_tiles(shape: tuple[int, int]) -> BoolArray:
+    """Return the tiles of a picture, of so many rows and columns, all of them wanted."""
+    return np.ones((-(-shape[0] // TILE_ROWS), -(-shape[1] // TILE_COLUMNS)), np.bool_)
+
+
+def tiles_about(rows: FloatArray, shape: tuple[int, int], *, reach_px: float) -> BoolArray:
+    """Return the tiles that lie about some lines.
+
+    Parameters
+    ----------
+    rows : float64 array, shape (line, column)
+        NaN where a line is not wanted.
+    shape : (int, int)
+        Rows and columns of the picture.
+    reach_px : float
+        So many rows on each side of a line are wanted.
+
+    Returns
+    -------
+    bool array, shape (tile of rows, tile of columns)
+    """
+    wanted = ~all_tiles(shape)
+    _mark(rows, float(reach_px), wanted)
+    return wanted
+
+
+@numba.njit(cache=True, nogil=True)
+def _mark(rows, reach, wanted):  # type: ignore[no-untyped-def]
+    for line in rows:
+        for tile in range(wanted.shape[1]):
+            lowest, highest = np.inf, -np.inf
+            for row in line[tile * TILE_COLUMNS : (tile + 1) * TILE_COLUMNS]:
+                if row < lowest:
+                    lowest = row
+                if row > highest:
+                    highest = row
+            if highest >= lowest:
+                low = max(int(np.floor(lowest - reach)) // TILE_ROWS, 0)
+                high = min(int(np.ceil(highest + reach)) // TILE_ROWS, wanted.shape[0] - 1)
+                wanted[low : high + 1, tile] = True
+
+
+def overlay(
+    images: ImageArray, shift_px: FloatArray, frame_index: npt.NDArray[np.int64], wanted: BoolArray | None = None
+) -> Overlay:
     """Lay frames over each other along their shifts.
 
     Parameters
@@ -89,6 +159,8 @@ def overlay(images: ImageArray, shift_px: FloatArray, frame_index: npt.NDArray[n
         ≥ 0, how far the record has turned since the first frame.
     frame_index : int64 array, shape (frame,)
         Number of each frame in running order.
+    wanted : bool array, shape (tile of rows, tile of columns), optional
+        Which tiles of the overlay are to be drawn; all when left out.
 
     Returns
     -------
@@ -96,13 +168,16 @@ def overlay(images: ImageArray, shift_px: FloatArray, frame_index: npt.NDArray[n
         Columns that no frame covers (one at each end, lost to interpolation) repeat their neighbour.
     """
     height, width = images.shape[1:]
-    canvas_width = width + int(np.floor(shift_px.max(initial=0.0)))
+    canvas_width = overlay_width(width, shift_px)
     counts = np.zeros(canvas_width, np.int64)
     for shift in shift_px:
         start, stop, _, _ = placement(float(shift), width, canvas_width)
         counts[start:stop] += 1
-    columns = np.empty((canvas_width, height), np.float32)
-    _overlay(images, shift_px, (1 / np.maximum(counts, 1)).astype(np.float32), columns)
+    columns = np.zeros((canvas_width, height), np.float32)
+    tiles = all_tiles((height, canvas_width)) if wanted is None else wanted
+    share = (1 / np.maximum(counts, 1)).astype(np.float32)
+    film = np.ascontiguousarray(images)
+    _overlay(film.reshape(-1), film.shape, shift_px, share, tiles, columns)
     covered = np.flatnonzero(counts)
     if covered.size:
         columns[: covered[0]] = columns[covered[0]]
@@ -110,9 +185,54 @@ def overlay(images: ImageArray, shift_px: FloatArray, frame_index: npt.NDArray[n
     return Overlay(columns, counts, shift_px, frame_index)
 
 
-def overlaid(group: FrameGroup) -> tuple[Overlay, FloatArray]:
-    """Return the valid frames of a group laid over each other, and the steps between frames (see `frame_shifts`)."""
-    shift_px, step_m = frame_shifts(group)
-    index = np.flatnonzero(group.valid)
-    images = group.images if index.size == group.images.shape[0] else group.images[index]
-    return overlay(images, shift_px, index), step_m
+def overlay_width(width: int, shift_px: FloatArray) -> int:
+    """Return how many columns an overlay has, of frames that have so many."""
+    return width + int(np.floor(shift_px.max(initial=0.0)))
+
+
+SLOPE_REACH = 4
+
+
+def _slope_taps() -> Float32Array:
+    """The derivative of a Gaussian of one pixel: weights of x₁ − x₋₁ … x₄ − x₋₄, exact for a straight line."""
+    k = np.arange(1, SLOPE_REACH + 1)
+    taps = k * np.exp(-0.5 * k**2)
+    return np.asarray(taps / np.sum(2 * k * taps), np.float32)
+
+
+_SLOPE_TAPS = _slope_taps()
+
+
+@numba.njit(cache=True, nogil=True, fastmath={"contract"})
+def _add_difference(w, after, before, out):  # type: ignore[no-untyped-def]
+    for j in range(out.size):
+        out[j] += w * (after[j] - before[j])
+
+
+@numba.njit(cache=True, nogil=True)
+def _slope(columns, taps, slope):  # type: ignore[no-untyped-def]
+    width, height = columns.shape
+    one = np.empty(height, np.float32)
+    for x in range(width):
+        one[:] = np.float32(0)
+        for k in range(1, taps.size + 1):
+            _add_difference(taps[k - 1], columns[min(x + k, width - 1)], columns[max(x - k, 0)], one)
+        slope[:, x] = one
+
+
+def slope_along(columns: Float32Array) -> Float32Array:
+    """Return the derivative of a picture along the groove, by that of a Gaussian of one pixel.
+
+    Parameters
+    ----------
+    columns : float32 array, shape (column, row)
+        Beyond its ends the last column is held.
+
+    Returns
+    -------
+    float32 array, shape (row, column)
+        Grey levels a pixel.
+    """
+    slope = np.empty(columns.shape[::-1], np.float32)
+    _slope(columns, _SLOPE_TAPS, slope)
+    return slope

@@ -17,23 +17,28 @@ from scipy import ndimage
 
 from gramoscope.apparatus.bench import Bench
 from gramoscope.camera.exposure import Exposure
-from gramoscope.conventions import INNER, OUTER, FloatArray, IntArray
+from gramoscope.conventions import INNER, OUTER, BoolArray, Float32Array, FloatArray, IntArray
 from gramoscope.errors import require
 from gramoscope.pickup.cartridge import Line, Sketch, Spread
-from gramoscope.pickup.overlay import Overlay, overlaid
-from gramoscope.pickup.registration import overlap_textures
+from gramoscope.pickup.overlay import TILE_COLUMNS, Overlay, overlay, overlay_width, slope_along, tiles_about
+from gramoscope.pickup.registration import frame_shifts, overlap_textures, strip_columns
 from gramoscope.pickup.texture.calibration import aligned_layout, calibration_of
+from gramoscope.pickup.texture.following import TAPS, wide_rows
 from gramoscope.pickup.texture.groove_search import GrooveSearch
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.learning import Learning, Lesson
-from gramoscope.pickup.texture.reading import Evidence, Rules, read, settled, spaced
+from gramoscope.pickup.texture.reading import Evidence, Model, Rules, read, settled, spaced
 from gramoscope.pickup.texture.sharpness import CELL_PX, sharpness
 from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.quality import Quality, no_flags
 from gramoscope.signal_path import FrameGroup, Texture, WallTrace
 
+Coarse = tuple[FloatArray, FloatArray]
+
 STRIDE_PX = 8
 """Columns whose evidence makes one sample."""
+WANDER_PX = 10.0
+"""A path that goes further than this from where the coarse search found it sees black, and is not believed."""
 NEARLY_WHITE = 0.97
 """Points brighter than this share of full scale are burnt out."""
 SEARCH_MARGIN_PX = -16.0
@@ -96,35 +101,64 @@ class TextureLikelihood:
             if progress is not None:
                 progress(min(done, total), total)
 
-        laid, seen = [], []
-        for number, one in zip(numbers, spread(lambda n: self._laid(group(int(n))), numbers), strict=True):
+        seen = list[Sight]()
+        for sight in spread(lambda number: self.sight(group(int(number))), numbers):
             told(1)
-            if one is not None:
-                laid.append(one)
-                seen.append(int(number))
+            if sight is not None:
+                seen.append(sight)
         nominal = StripeLayout.of_bench(self.bench, edge_margin_px=SEARCH_MARGIN_PX)
         unread = TexturePickup(self, nominal)
-        if not laid:
+        if not seen:
             return unread
-        layout, stretches = aligned_layout(
-            [columns for columns, _, _ in laid], nominal, self.search, self.bench.disc.cut, spread
+        layout, paths = aligned_layout(
+            [sight.sharp for sight in seen], nominal, self.search, self.bench.disc.cut, spread
         )
         pickup = replace(unread, layout=layout)
-        prepared = list(spread(lambda i: pickup.stretch(*laid[i], found=stretches[i]), range(len(laid))))
+
+        def prepared(i: int) -> Stretch:
+            film, _ = self.exposure.sort_out(group(seen[i].number))
+            return pickup.stretch(film, seen[i], paths[i])[0]
+
+        stretches = list(spread(prepared, range(len(seen))))
         told(numbers.size)
         inner = StripeLayout.of_bench(self.bench, edge_margin_px=self.edge_margin_px).at(layout.rest_row)
         lessons = self.learning.learn(
-            prepared, inner, self.bench.disc.cut, self.rules, spread, lambda: told(numbers.size)
+            stretches, inner, self.bench.disc.cut, self.rules, spread, lambda: told(numbers.size)
         )
-        fold = {number: i % self.learning.folds for i, number in enumerate(seen)}
+        fold = {sight.number: i % self.learning.folds for i, sight in enumerate(seen)}
         return replace(pickup, lessons=lessons, fold=fold)
 
-    def _laid(self, group: FrameGroup) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        group, _ = self.exposure.sort_out(group)
-        if not group.valid.any():
-            return None
-        laid, _ = overlaid(group)
-        return laid_out(laid, group.white_level)
+    def sight(self, group: FrameGroup) -> Sight | None:
+        """Return what the coarse search needs of a group; None when no frame is usable."""
+        film, _ = self.exposure.sort_out(group)
+        return sight_of(film) if film.valid.any() else None
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """A group at first sight.
+
+    Attributes
+    ----------
+    number : int
+        Of the group.
+    shift_px : float64 array, shape (valid frame,)
+    step_m : float64 array, shape (frame − 1,)
+        How far the record turned, see `registration.frame_shifts`.
+    sharp : float32 array, shape (cell, row)
+        Where its picture is sharp.
+    """
+
+    number: int
+    shift_px: FloatArray
+    step_m: FloatArray
+    sharp: Float32Array
+
+
+def sight_of(group: FrameGroup) -> Sight:
+    """Return a group at first sight, by its valid frames, of which there must be one."""
+    shift_px, step_m = frame_shifts(group)
+    return Sight(group.number, shift_px, step_m, sharpness(group.usable_images, shift_px))
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,10 +209,15 @@ class TexturePickup:
             return self._lost(group, exposure_flags, group.problems)
         if not self.taught:
             return self._lost(group, exposure_flags, (*group.problems, f"group {group.number} is not read: {UNTAUGHT}"))
-        laid, step_m = overlaid(group)
-        stretch, found = self._read(laid, group)
+        sight = sight_of(group)
+        stretch, laid = self.stretch(group, sight, self.searched(sight))
+        path, found = read(stretch, self.models_for(group.number), self.cartridge.bench.disc.cut, self.cartridge.rules)
         head, tail = self.strips(laid, group)
-        return replace(self._trace(group, stretch, found, exposure_flags, step_m), head=head, tail=tail)
+        return replace(self._trace(group, path, found, exposure_flags, sight.step_m), head=head, tail=tail)
+
+    def searched(self, sight: Sight) -> Coarse:
+        """Return where the coarse search finds both walls, and how sharp each stripe; see `GrooveSearch.find`."""
+        return self.cartridge.search.find(sight.sharp, self.layout, cut=self.cartridge.bench.disc.cut)
 
     def strips(self, laid: Overlay, group: FrameGroup) -> tuple[Texture | None, Texture | None]:
         """Return the texture at both ends of a group's mean, by which it is matched with its neighbours."""
@@ -187,7 +226,7 @@ class TexturePickup:
             first=int(laid.frame_index[0]),
             width=laid.columns.shape[0],
             group_step_m=self.cartridge.bench.sequence.group_step_m,
-            texture_of=lambda columns: ndimage.gaussian_filter(laid.columns[columns].T, 1.0, order=(0, 1)),
+            texture_of=lambda columns: slope_along(laid.columns[columns]),
         )
 
     @property
@@ -200,7 +239,9 @@ class TexturePickup:
         group, _ = self.cartridge.exposure.sort_out(group)
         if not group.valid.any() or not self.taught:
             return None
-        stretch, found = self._read(overlaid(group)[0], group)
+        sight = sight_of(group)
+        begun, _ = self.stretch(group, sight, self.searched(sight))
+        stretch, found = read(begun, self.models_for(group.number), self.cartridge.bench.disc.cut, self.cartridge.rules)
         image = group.images[int(np.flatnonzero(group.valid)[0])]
         model = self.lessons[-1].whole
         layout = model.layout
@@ -215,30 +256,41 @@ class TexturePickup:
                 lines.append(Line(name, rows[number, : image.shape[1]], measured[: image.shape[1]]))
         return Sketch(image, tuple(lines))
 
-    def stretch(
-        self,
-        columns: np.ndarray,
-        usable: np.ndarray,
-        burnt: np.ndarray,
-        found: tuple[FloatArray, FloatArray] | None = None,
-    ) -> Stretch:
-        """Lay a stretch ready: search the groove in it, if that was not done, and draw its paths column by column."""
-        cut = self.cartridge.bench.disc.cut
-        if found is None:
-            found = self.cartridge.search.find(sharpness(columns), self.layout, cut=cut)
-        x = np.arange(columns.shape[0])
-        cell: FloatArray = (np.arange(found[0].shape[1], dtype=np.float64) + 0.5) * CELL_PX - 0.5
-        path = _by_column(found[0], x, cell, smooth_cells=1.5)
-        support = _by_column(found[1], x, cell, smooth_cells=SUPPORT_CELLS)
-        walls = np.array([support[self.layout.wall == wall].max(axis=0, initial=0.0) for wall in (INNER, OUTER)])
-        return Stretch(columns, usable, burnt, settled(path, walls, cut, self.cartridge.rules), support)
+    def stretch(self, group: FrameGroup, sight: Sight, coarse: Coarse) -> tuple[Stretch, Overlay]:
+        """Lay a stretch ready: draw the coarse paths column by column, and the picture about the stripes.
 
-    def _read(self, laid: Overlay, group: FrameGroup) -> tuple[Stretch, Evidence]:
-        fold = self.fold.get(group.number)
+        Parameters
+        ----------
+        group : FrameGroup
+            At least one frame valid.
+        sight : Sight
+        coarse : (float64 array, shape (2, cell); float64 array, shape (stripe, cell))
+            Paths of the walls and support of the stripes, as `searched` finds them.
+        """
+        width = overlay_width(group.images.shape[2], sight.shift_px)
+        x = np.arange(width)
+        cell: FloatArray = (np.arange(coarse[0].shape[1], dtype=np.float64) + 0.5) * CELL_PX - 0.5
+        path = _by_column(coarse[0], x, cell, smooth_cells=1.5)
+        support = _by_column(coarse[1], x, cell, smooth_cells=SUPPORT_CELLS)
+        walls = np.array([support[self.layout.wall == wall].max(axis=0, initial=0.0) for wall in (INNER, OUTER)])
+        path = settled(path, walls, self.cartridge.bench.disc.cut, self.cartridge.rules)
+        half_px = self.cartridge.learning.half_px
+        rows = self.layout.rows(path)
+        rows[~self.layout.visible(rows, half_px=half_px - WANDER_PX)] = np.nan
+        reach_px = wide_rows(half_px) / 2 + TAPS / 2 + WANDER_PX
+        wanted = tiles_about(rows, (group.images.shape[1], width), reach_px=reach_px)
+        for end in strip_columns(group, width=width, group_step_m=self.cartridge.bench.sequence.group_step_m):
+            tiles = slice(end.start // TILE_COLUMNS, -(-end.stop // TILE_COLUMNS))
+            wanted[:, tiles] = wanted[:, tiles].any(axis=1, keepdims=True)
+        laid = overlay(group.usable_images, sight.shift_px, np.flatnonzero(group.valid), wanted)
+        usable = laid.frames * 2 >= laid.frames.max()
+        return Stretch(laid.columns, usable, burnt_places(laid, group.white_level), path, support), laid
+
+    def models_for(self, number: int) -> list[Model]:
+        """Return the models by which a group is read, round by round: none that the group itself has taught."""
+        fold = self.fold.get(number)
         lessons = [self.lessons[i] for i in spaced(len(self.lessons), self.cartridge.rounds)]
-        models = [lesson.whole if fold is None else lesson.without[fold] for lesson in lessons]
-        stretch = self.stretch(*laid_out(laid, group.white_level))
-        return read(stretch, models, self.cartridge.bench.disc.cut, self.cartridge.rules)
+        return [lesson.whole if fold is None else lesson.without[fold] for lesson in lessons]
 
     def _trace(
         self, group: FrameGroup, stretch: Stretch, found: Evidence, exposure_flags: Quality, step_m: FloatArray
@@ -292,10 +344,10 @@ UNSEEN = Quality.NO_STRIPE | Quality.INTERPOLATED
 UNTAUGHT = "too little of the stripes is seen to learn their texture; the recipe seed-paper reads single groups"
 
 
-def laid_out(laid: Overlay, white_level: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return a group's mean column by column, which columns rest on enough frames, and what is burnt out."""
+def burnt_places(laid: Overlay, white_level: int) -> BoolArray:
+    """Return what is burnt out, shape (column, row); of no rows when nothing is."""
     burnt = laid.columns >= NEARLY_WHITE * white_level
-    return laid.columns, laid.frames * 2 >= laid.frames.max(), burnt if burnt.any() else burnt[:, :0]
+    return burnt if burnt.any() else burnt[:, :0]
 
 
 def samples_of(stretch: Stretch, found: Evidence) -> tuple[FloatArray, FloatArray]:

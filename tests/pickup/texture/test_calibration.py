@@ -16,6 +16,7 @@ from gramoscope.pickup.texture.groove_search import GrooveSearch
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.likelihood import StripeStatistics
 from gramoscope.pickup.texture.reading import Model
+from gramoscope.pickup.texture.sharpness import sharpness
 from gramoscope.pickup.texture.spectrum import Band
 from gramoscope.pickup.texture.tone import Tone
 from gramoscope.simulation.scene import filming_bench
@@ -38,12 +39,16 @@ def _picture(number: int, true: StripeLayout) -> np.ndarray:
     for one, low, high in zip(rows, true.first_row, true.last_row, strict=True):
         away = np.arange(HEIGHT) - one[:, None]
         amplitude += 20 * np.exp(-(away**2) / (2 * 3.0**2)) * ((one >= low) & (one <= high))[:, None]
-    return (100 + (1 + amplitude) * rng.normal(size=amplitude.shape)).astype(np.float32)
+    return np.rint(2000 + 10 * (1 + amplitude) * rng.normal(size=amplitude.shape)).astype(np.uint16).T
+
+
+def _sharp(pictures: list[np.ndarray]) -> list[np.ndarray]:
+    return [sharpness(np.ascontiguousarray(picture)[np.newaxis], np.zeros(1)) for picture in pictures]
 
 
 def _aligned(nominal: StripeLayout, true: StripeLayout) -> tuple[StripeLayout, list[tuple[FloatArray, FloatArray]]]:
     pictures = [_picture(number, true) for number in range(5)]
-    return aligned_layout(pictures, nominal, GrooveSearch(), "lateral", map)
+    return aligned_layout(_sharp(pictures), nominal, GrooveSearch(), "lateral", map)
 
 
 @pytest.mark.parametrize("thicker", [-0.1, 0.0, 0.1])
@@ -69,14 +74,14 @@ def test_the_order_in_which_stretches_are_looked_at_does_not_matter() -> None:
     def backwards(work: Any, tasks: Any) -> Any:
         return iter([work(task) for task in list(tasks)[::-1]][::-1])
 
-    one, _ = aligned_layout(pictures, _layout(), GrooveSearch(), "lateral", map)
-    other, _ = aligned_layout(pictures, _layout(), GrooveSearch(), "lateral", backwards)
+    one, _ = aligned_layout(_sharp(pictures), _layout(), GrooveSearch(), "lateral", map)
+    other, _ = aligned_layout(_sharp(pictures), _layout(), GrooveSearch(), "lateral", backwards)
     np.testing.assert_array_equal(one.rest_row, other.rest_row)
 
 
 def test_pictures_that_show_nothing_leave_the_layout_as_the_manifest_has_it() -> None:
     blank = [np.random.default_rng(1).normal(100, 1, (WIDTH, HEIGHT)).astype(np.float32)] * 3
-    found, _ = aligned_layout(blank, _layout(), GrooveSearch(), "lateral", map)
+    found, _ = aligned_layout(_sharp(blank), _layout(), GrooveSearch(), "lateral", map)
     np.testing.assert_array_equal(found.rest_row, _layout().rest_row)
 
 

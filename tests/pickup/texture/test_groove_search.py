@@ -11,7 +11,7 @@ from gramoscope.disc.formats import Cut
 from gramoscope.errors import ArgumentError
 from gramoscope.pickup.texture.groove_search import GrooveSearch, best_path
 from gramoscope.pickup.texture.layout import StripeLayout
-from gramoscope.pickup.texture.sharpness import CELL_PX, ridges, sharpness
+from gramoscope.pickup.texture.sharpness import CELL_PX, cell_energy, ridges, sharpness
 from gramoscope.simulation.scene import filming_bench
 
 CELLS, HEIGHT = 160, 640
@@ -169,16 +169,19 @@ def test_a_usual_swing_of_nothing_is_refused() -> None:
         GrooveSearch(usual_swing_px=0.0)
 
 
-def _texture(row: float, *, gain: float = 1.0, offset: float = 0.0) -> np.ndarray:
-    """Columns first: camera noise everywhere, texture about one row, shading across."""
+def _texture(row: float, *, gain: float = 1.0, offset: float = 100.0) -> np.ndarray:
+    """One frame: camera noise everywhere, texture about one row, shading across."""
     rng = np.random.default_rng(2)
     away = np.arange(200) - row
     columns = rng.normal(size=(640, 200)) * (1 + 3 * np.exp(-(away**2) / (2 * 3.0**2))) + 0.4 * np.arange(200)
-    return (gain * columns + offset).astype(np.float32)
+    return np.rint(20 * gain * (columns + offset)).astype(np.uint16).T[np.newaxis].copy()
+
+
+STILL = np.zeros(1)
 
 
 def test_the_picture_is_sharp_where_its_texture_is_and_shading_is_none() -> None:
-    sharp = sharpness(_texture(83.0))
+    sharp = sharpness(_texture(83.0), STILL)
     assert sharp.shape == (640 // CELL_PX, 200)
     mean = sharp.mean(axis=0)
     assert abs(int(np.argmax(mean)) - 83) <= 2
@@ -189,12 +192,32 @@ def test_the_picture_is_sharp_where_its_texture_is_and_shading_is_none() -> None
 
 def test_sharpness_does_not_depend_on_brightness_and_contrast() -> None:
     np.testing.assert_allclose(
-        sharpness(_texture(83.0, gain=7.0, offset=500.0)), sharpness(_texture(83.0)), rtol=1e-2, atol=1e-2
+        sharpness(_texture(83.0, gain=7.0, offset=300.0), STILL), sharpness(_texture(83.0), STILL), atol=3e-2
     )
 
 
 def test_a_picture_without_texture_is_nowhere_sharp() -> None:
-    assert (sharpness(np.full((64, 50), 90.0, np.float32)) == 0).all()
+    assert (sharpness(np.full((3, 50, 64), 90, np.uint8), np.array([0.0, 2.0, 4.0])) == 0).all()
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_the_energy_of_a_cell_is_that_of_the_frames_laid_over_each_other(dtype: type) -> None:
+    rng = np.random.default_rng(7)
+    images, shift = rng.integers(0, 250, (3, 4, 70)).astype(dtype), np.array([0.0, 3.4, 7.7])
+    total, count = np.zeros((4, 77)), np.zeros(77)
+    for image, first in zip(images, (0, 3, 7), strict=True):
+        total[:, first : first + 70] += image
+        count[first : first + 70] += 1
+    mean = total / count
+    slope = mean[:, 4:-2] - mean[:, 2:-4] + 0.5 * (mean[:, 5:-1] - mean[:, 1:-5])
+    square = np.pad(slope**2, ((0, 0), (3, 3)))
+    expected = square[:, :72].reshape(4, 9, CELL_PX).sum(axis=2).T
+    energy = np.empty((9, 4), np.float32)
+    total_room = np.empty(77, np.uint16 if dtype is np.uint8 else np.uint32)
+    cell_energy(images, np.array([0, 3, 7]), (1 / count).astype(np.float32), total_room, energy)
+    np.testing.assert_allclose(energy, expected, rtol=1e-4)
+    # uneven shifts count to whole pixels, and the last frame ends where the picture does
+    assert sharpness(images, shift).shape == (9, 4)
 
 
 def test_a_ridge_stands_over_its_flanks_and_a_plain_is_none() -> None:

@@ -19,7 +19,7 @@ from gramoscope.pickup.cartridge import Spread
 from gramoscope.pickup.texture.groove_search import GrooveSearch
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.reading import Model
-from gramoscope.pickup.texture.sharpness import ridges, sharpness
+from gramoscope.pickup.texture.sharpness import ridges
 
 REACH_PX = 14
 """A stripe may lie so far from where the manifest puts it: more than a tenth of the distance between stripes."""
@@ -27,19 +27,19 @@ ROUNDS = 3
 
 
 def aligned_layout(
-    pictures: Sequence[Float32Array], nominal: StripeLayout, search: GrooveSearch, cut: Cut, spread: Spread
+    sharp: Sequence[Float32Array], nominal: StripeLayout, search: GrooveSearch, cut: Cut, spread: Spread
 ) -> tuple[StripeLayout, list[tuple[FloatArray, FloatArray]]]:
     """Return where the stripes lie, and the coarse paths of all stretches.
 
     Parameters
     ----------
-    pictures : sequence of float32 arrays, shape (column, row)
+    sharp : sequence of float32 arrays, shape (cell, row)
+        From `texture.sharpness`, of some stretches.
     nominal : StripeLayout
     search : GrooveSearch
     cut : {"lateral", "vertical", "stereo"}
     spread : callable
     """
-    sharp = list(spread(sharpness, pictures))
     layout = nominal
     for _ in range(ROUNDS):
         found = list(spread(partial(_found, search, layout, cut), sharp))
@@ -54,7 +54,7 @@ def _found(search: GrooveSearch, layout: StripeLayout, cut: Cut, sharp: Float32A
     return search.find(sharp, layout, cut=cut)
 
 
-def _shifts(sharp: list[Float32Array], paths: list[FloatArray], layout: StripeLayout) -> FloatArray:
+def _shifts(sharp: Sequence[Float32Array], paths: list[FloatArray], layout: StripeLayout) -> FloatArray:
     """How far each stripe lies from the layout, rows, the stripe of the outer wall that is seen most kept in place."""
     aside = np.arange(-REACH_PX, REACH_PX + 1)
     profile, seen = np.zeros((layout.wall.size, aside.size)), np.zeros(layout.wall.size)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from gramoscope.conventions import INNER, OUTER, Float32Array, FloatArray
+from gramoscope.conventions import INNER, OUTER, Float32Array, FloatArray, IntArray
 from gramoscope.disc.formats import Cut
 from gramoscope.errors import require
 from gramoscope.pickup.texture.layout import BOTTOM_PX, StripeLayout, wall_sign
@@ -104,6 +104,31 @@ def _add_stripe(coarse, first_row, seen_rows, absent, score):  # type: ignore[no
             _add_above(coarse[row % GRID_PX, cell, at : at + stop - start], absent, score[cell, v, start:stop])
 
 
+@numba.njit(cache=True, nogil=True)
+def _thin_out(ridge, coarse):  # type: ignore[no-untyped-def]
+    """Write coarse[row % GRID_PX, cell, row // GRID_PX]: on a coarse grid a ridge is where any of three rows is."""
+    cells, height = ridge.shape
+    near = np.empty(height, np.float32)
+    for cell in range(cells):
+        row = ridge[cell]
+        near[0], near[-1] = max(row[0], row[1]), max(row[-1], row[-2])
+        _largest_of_three(row[:-2], row[1:-1], row[2:], near[1:-1])
+        for part in range(GRID_PX):
+            some = near[part::GRID_PX]
+            coarse[part, cell, : some.size] = some
+
+
+@numba.njit(cache=True, nogil=True)
+def _largest_of_three(before, here, after, out):  # type: ignore[no-untyped-def]
+    for j in range(out.size):
+        out[j] = max(here[j], max(before[j], after[j]))
+
+
+def _grid(low: float, high: float) -> IntArray:
+    """Return the points of the coarse grid from low to high, 0 among them."""
+    return GRID_PX * np.arange(min(int(low // GRID_PX) + 1, 0), max(int(high // GRID_PX), 0) + 1)
+
+
 @dataclass(frozen=True)
 class GrooveSearch:
     """The coarse search.
@@ -166,16 +191,16 @@ class GrooveSearch:
         """Return the lateral and the vertical displacement that suit all stripes, on a grid of `GRID_PX`."""
         height = ridge.shape[1]
         reach = {
-            "lateral": (height, self.drift_px),
+            "lateral": (np.inf, self.drift_px),
             "vertical": (self.drift_px, self.swing_px),
             "stereo": (self.swing_px, self.swing_px),
         }[cut]
-        lateral, vertical = (GRID_PX * np.arange(-int(r // GRID_PX), int(r // GRID_PX) + 1) for r in reach)
-        # on a coarse grid a ridge is where any of its rows is
-        wide = np.maximum(ridge, np.maximum(np.roll(ridge, 1, axis=1), np.roll(ridge, -1, axis=1)))
-        beyond = -height % GRID_PX
-        coarse = np.pad(wide, ((0, 0), (0, beyond))).reshape(len(ridge), -1, GRID_PX).transpose(2, 0, 1)
-        coarse = np.ascontiguousarray(coarse, np.float32)
+        # further than this no stripe is seen
+        low, high = (layout.first_row - layout.rest_row).min(), (layout.last_row - layout.rest_row).max()
+        lateral = _grid(max(low - reach[1], -reach[0]), min(high + reach[1], reach[0]))
+        vertical = _grid(-reach[1], reach[1])
+        coarse = np.zeros((GRID_PX, len(ridge), -(-height // GRID_PX)), np.float32)
+        _thin_out(ridge, coarse)
         used = [cut != "vertical", cut != "lateral"]
         large = [self.usual_swing_px if use else self.usual_drift_px for use in used]
         usual = (lateral / large[0]) ** 2 + (vertical[:, None] / large[1]) ** 2

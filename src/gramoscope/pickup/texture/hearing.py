@@ -176,7 +176,8 @@ def _draw(columns, rows, clear, half_px, half_taps, basis, usual, limits, drawn,
     stripes, _, channels = drawn.shape
     width = columns.shape[0]
     blocks = -(-width // BLOCK)
-    window = np.zeros((blocks * BLOCK, basis.shape[1]), np.float32)
+    window = np.empty((blocks * BLOCK, basis.shape[1]), np.float32)
+    window[width:] = np.float32(0)
     raw = np.empty((blocks * BLOCK, channels), np.float32)
     white, power = np.empty((width, channels), np.float32), np.empty(width, np.float32)
     seen, valid = np.empty((BLOCK, channels), np.float32), np.empty(width, np.bool_)

@@ -11,31 +11,64 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from gramoscope.conventions import Float32Array
+from gramoscope.conventions import Float32Array, FloatArray
+from gramoscope.pickup.overlay import overlay_width
+from gramoscope.signal_path import ImageArray
 
 CELL_PX = 8
 """Columns in a cell."""
 
 
 @numba.njit(cache=True, nogil=True)
-def _cell_energy(columns, energy):  # type: ignore[no-untyped-def]
-    cells, height = energy.shape
-    width = columns.shape[0]
-    for cell in range(cells):
-        for x in range(max(cell * CELL_PX, 3), min((cell + 1) * CELL_PX, width - 3)):
-            for y in range(height):
-                # the derivative of a Gaussian of about one pixel, from six columns
-                difference = columns[x + 1, y] - columns[x - 1, y]
-                difference += np.float32(0.5) * (columns[x + 2, y] - columns[x - 2, y])
-                energy[cell, y] += difference * difference
+def _add_pixels(pixels, total):  # type: ignore[no-untyped-def]
+    for x in range(pixels.size):
+        total[x] += pixels[x]
 
 
-def sharpness(columns: Float32Array, *, ceiling: float = 1.5) -> Float32Array:
-    """Return how sharp the picture is, cell by cell.
+@numba.njit(cache=True, nogil=True)
+def _squares(far_before, before, after, far_after, square):  # type: ignore[no-untyped-def]
+    """The derivative of a Gaussian of about one pixel, from four columns, squared."""
+    half = np.float32(0.5)
+    for x in range(square.size):
+        difference = after[x] - before[x] + half * (far_after[x] - far_before[x])
+        square[x] = difference * difference
+
+
+@numba.njit(cache=True, nogil=True)
+def _scale(total, share, mean):  # type: ignore[no-untyped-def]
+    for x in range(mean.size):
+        mean[x] = total[x] * share[x]
+
+
+@numba.njit(cache=True, nogil=True)
+def _sum_of_eight(values, cell):  # type: ignore[no-untyped-def]
+    v = values[cell * CELL_PX : (cell + 1) * CELL_PX]
+    return ((v[0] + v[4]) + (v[1] + v[5])) + ((v[2] + v[6]) + (v[3] + v[7]))
+
+
+@numba.njit(cache=True, nogil=True)
+def cell_energy(images, offset, share, total, energy):  # type: ignore[no-untyped-def]
+    """Write the energy of each cell of the mean of frames laid over each other by whole pixels; `total` has room for sums."""
+    frames, height, width = images.shape
+    mean, square = np.empty(total.size, np.float32), np.zeros(total.size, np.float32)
+    for row in range(height):
+        total[:] = 0
+        for k in range(frames):
+            _add_pixels(images[k, row], total[offset[k] : offset[k] + width])
+        _scale(total, share, mean)
+        _squares(mean[1:-5], mean[2:-4], mean[4:-2], mean[5:-1], square[3:-3])
+        for cell in range(energy.shape[0]):
+            energy[cell, row] = _sum_of_eight(square, cell)
+
+
+def sharpness(images: ImageArray, shift_px: FloatArray, *, ceiling: float = 1.5) -> Float32Array:
+    """Return how sharp the picture of a group is, cell by cell.
 
     Parameters
     ----------
-    columns : float32 array, shape (column, row)
+    images : uint8 or uint16 array, shape (frame, row, column)
+    shift_px : float64 array, shape (frame,)
+        ≥ 0, how far the record has turned since the first frame; here to whole pixels.
     ceiling : float
         Cells are not believed to be sharper than so many times the picture's sharpest row.
 
@@ -44,28 +77,67 @@ def sharpness(columns: Float32Array, *, ceiling: float = 1.5) -> Float32Array:
     float32 array, shape (cell, row)
         Root of the energy above the noise, a little smoothed, in units of the sharpest row of a typical cell.
     """
-    cells = columns.shape[0] // CELL_PX
-    energy = np.zeros((cells, columns.shape[1]), np.float32)
-    _cell_energy(columns, energy)
-    energy = _smoothed(energy)
+    width = overlay_width(images.shape[2], shift_px)
+    offset = np.minimum(np.rint(shift_px).astype(np.int64), width - images.shape[2])
+    counts = np.zeros(width)
+    for first in offset:
+        counts[first : first + images.shape[2]] += 1
+    energy = np.empty((width // CELL_PX, images.shape[1]), np.float32)
+    small = images.dtype == np.uint8 and len(images) <= np.iinfo(np.uint16).max // np.iinfo(np.uint8).max
+    total = np.empty(width, np.uint16 if small else np.uint32)
+    cell_energy(images, offset, (1 / np.maximum(counts, 1)).astype(np.float32), total, energy)
+    sharp = np.empty_like(energy)
+    _smooth(energy, sharp)
     # a row is quiet all along the stretch, or it is not
-    noise = np.float32(np.quantile(np.median(energy[::EVERY], axis=0), 0.1))
-    amplitude = np.sqrt(np.maximum(energy - noise, np.float32(0)))
-    reference = np.float32(np.median(amplitude.max(axis=1)))
-    return np.minimum(amplitude / reference, np.float32(ceiling)) if reference > 0 else np.zeros_like(amplitude)
+    noise = np.float32(np.quantile(np.median(sharp[::EVERY], axis=0), 0.1))
+    peak = np.empty(len(sharp), np.float32)
+    _amplitudes(sharp, noise, peak)
+    reference = np.float32(np.median(peak))
+    _limit(sharp, np.float32(1 / reference) if reference > 0 else np.float32(0), np.float32(ceiling))
+    return sharp
 
 
-EVERY = 4
+EVERY = 8
 """Of so many cells one is looked at to find out how quiet the quietest rows are."""
 
 
-def _smoothed(values: Float32Array) -> Float32Array:
+@numba.njit(cache=True, nogil=True)
+def _smooth_cell(far_before, before, here, after, far_after, out):  # type: ignore[no-untyped-def]
+    ninth = np.float32(1 / 9)
+    for row in range(out.size):
+        beside = far_before[row] + far_after[row] + np.float32(2) * (before[row] + after[row])
+        out[row] = ninth * (beside + np.float32(3) * here[row])
+
+
+@numba.njit(cache=True, nogil=True)
+def _smooth(energy, out):  # type: ignore[no-untyped-def]
     """A triangle of three cells along the groove: texture is random, and one cell is a poor witness."""
-    padded = np.pad(values / np.float32(9), ((2, 2), (0, 0)), mode="edge")
-    total = padded[:-4] + padded[4:]
-    total += 2 * (padded[1:-3] + padded[3:-1])
-    total += 3 * padded[2:-2]
-    return np.asarray(total)
+    last = len(energy) - 1
+    for cell in range(last + 1):
+        before, after = max(cell - 1, 0), min(cell + 1, last)
+        far_before, far_after = max(cell - 2, 0), min(cell + 2, last)
+        _smooth_cell(energy[far_before], energy[before], energy[cell], energy[after], energy[far_after], out[cell])
+
+
+@numba.njit(cache=True, nogil=True)
+def _root_above(values, noise):  # type: ignore[no-untyped-def]
+    for row in range(values.size):
+        values[row] = np.sqrt(max(values[row] - noise, np.float32(0)))
+
+
+@numba.njit(cache=True, nogil=True)
+def _amplitudes(sharp, noise, peak):  # type: ignore[no-untyped-def]
+    """Turn energies into amplitudes above the noise, and find each cell's largest."""
+    for cell in range(len(sharp)):
+        _root_above(sharp[cell], noise)
+        peak[cell] = sharp[cell].max()
+
+
+@numba.njit(cache=True, nogil=True)
+def _limit(sharp, gain, ceiling):  # type: ignore[no-untyped-def]
+    for cell in sharp:
+        for row in range(cell.size):
+            cell[row] = min(cell[row] * gain, ceiling)
 
 
 @numba.njit(cache=True, nogil=True)
