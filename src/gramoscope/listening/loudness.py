@@ -44,7 +44,12 @@ _LOUDEST_LUFS, _BINS_A_LU = 30.0, 100
 
 LOWEST_RATE_HZ = 4000
 """Below it the shelf's corner nears half the rate: no loudness is measured."""
-_SHELF_HZ, _SHELF_Q, _SHELF_DB, _SHELF_MIDDLE = 1681.974450955533, 0.7071752369554196, 3.999843853973347, 0.4996667741545416
+_SHELF_HZ, _SHELF_Q, _SHELF_DB, _SHELF_MIDDLE = (
+    1681.974450955533,
+    0.7071752369554196,
+    3.999843853973347,
+    0.4996667741545416,
+)
 _HIGH_PASS_HZ, _HIGH_PASS_Q = 38.13547087602444, 0.5003270373238773
 
 
@@ -162,7 +167,7 @@ class LoudnessMeter:
         require(channels >= 1, f"{channels} channels", "at least one")
         self._deaf = rate_hz < LOWEST_RATE_HZ
         self._step = max(round(rate_hz / STEPS_A_SECOND), 1)
-        self._filter = None if self._deaf else k_weighting(rate_hz)
+        self._filter = k_weighting(max(rate_hz, LOWEST_RATE_HZ))
         self._state = np.zeros((2, 2, channels))
         self._rest = np.empty((0, channels))
         self._powers = np.empty(0)
@@ -211,7 +216,7 @@ class LoudnessMeter:
 
 
 def _loudest_lufs(power: float) -> float:
-    return float(_lufs(np.float64(power))) if power >= 0 else float("nan")
+    return float(_lufs(np.asarray(power))) if power >= 0 else float("nan")
 
 
 @dataclass(frozen=True, eq=False)

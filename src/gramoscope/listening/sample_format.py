@@ -36,7 +36,7 @@ class SampleFormat(Enum):
     @property
     def is_float(self) -> bool:
         """Whether samples are floats, which clip nothing and are not dithered."""
-        return self.value[0] == "float"
+        return self is SampleFormat.FLOAT_32
 
 
 def rounded(samples: FloatArray, *, bits: int, dither: np.random.Generator | None = None) -> npt.NDArray[np.int32]:
