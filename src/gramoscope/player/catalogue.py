@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
-from gramoscope.apparatus.capture import Capture
+from gramoscope.apparatus.bench import Bench
 from gramoscope.disc.formats import Disc
 from gramoscope.listening.broadcast_metadata import (
     DESCRIPTION,
@@ -56,13 +56,15 @@ class Catalogue:
         BroadcastMetadata(self.description, self.originator, self.reference)
 
 
-def metadata_of(track: Track, capture: Capture, recipe: Recipe, settings: Settings) -> BroadcastMetadata:
+def metadata_of(
+    track: Track, bench: Bench, recipe: Recipe, settings: Settings, *, capture_name: str
+) -> BroadcastMetadata:
     """Return what one sound file of a transfer says of itself."""
-    words, disc, program = settings.catalogue, capture.bench.disc, f"Gramoscope {version('gramoscope')}"
+    words, disc, program = settings.catalogue, bench.disc, f"Gramoscope {version('gramoscope')}"
     title = words.title or disc.notes.get("title", "")
-    reference = words.reference or ascii_text(capture.folder.resolve().name)[:REFERENCE]
+    reference = words.reference or ascii_text(capture_name)[:REFERENCE]
     description = _description(words.description or _record(title, disc), track, settings)
-    medium = f"gramophone record; {capture.bench.rotation.rpm:g} rpm; {disc.cut} cut"
+    medium = f"gramophone record; {bench.rotation.rpm:g} rpm; {disc.cut} cut"
     done = (
         f"{program}; optical; recipe {recipe.name}; {track.done(settings)}; full scale {settings.full_scale_m_s:g} m/s"
     )

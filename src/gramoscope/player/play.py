@@ -194,7 +194,8 @@ def _heard(pieces: Iterator[Audio], monitor: Monitor) -> Iterator[Audio]:
 
 
 def _outputs(capture: Capture, recipe: Recipe, folder: Path, settings: Settings) -> Outputs:
-    tracks = {track: metadata_of(track, capture, recipe, settings) for track in TRACKS}
+    name = capture.folder.resolve().name
+    tracks = {track: metadata_of(track, capture.bench, recipe, settings, capture_name=name) for track in TRACKS}
     return Outputs(folder, tracks, rate_hz=settings.rate_hz, full_scale_m_s=settings.full_scale_m_s, flac=settings.flac)
 
 
