@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import resource
 import shutil
 import subprocess
@@ -197,11 +198,12 @@ def test_a_folder_without_permission_is_said(tmp_path: Path) -> None:
     assert list((tmp_path / "out").iterdir()) == []
 
 
-def test_a_name_that_one_of_the_files_cannot_have_is_found_out_before_the_work(tmp_path: Path) -> None:
-    (tmp_path / "out" / "equalised.wav").mkdir(parents=True)
-    with pytest.raises(OutputError, match=r"equalised\.wav"), _outputs(tmp_path / "out"):
+@pytest.mark.parametrize("name", ["equalised.wav", "equalised.wav.sha256", "equalised.flac"])
+def test_a_name_that_one_of_the_files_cannot_have_is_found_out_before_the_work(tmp_path: Path, name: str) -> None:
+    (tmp_path / "out" / name).mkdir(parents=True)
+    with pytest.raises(OutputError, match=re.escape(name)), _outputs(tmp_path / "out"):
         pytest.fail("the block was entered")
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"equalised.wav"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {name}
 
 
 def test_what_a_killed_transfer_left_does_not_confuse_the_next(older: Path) -> None:

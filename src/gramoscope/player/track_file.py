@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -34,6 +35,11 @@ class TrackFile:
     metadata : BroadcastMetadata
     rate_hz, full_scale_m_s : float
     flac : bool
+
+    Raises
+    ------
+    OutputError
+        If a file cannot be created, or a folder has its name.
     """
 
     def __init__(
@@ -50,6 +56,10 @@ class TrackFile:
         self.wav = folder / track.name
         self.flac = self.wav.with_suffix(".flac") if flac else None
         self._beside = [sum_beside(self.wav), self.wav.with_suffix(".flac"), sum_beside(self.wav.with_suffix(".flac"))]
+        for path in self._beside:
+            # found out now, and not when hours of reading are done
+            if path.is_dir():
+                raise output_error(path, os.strerror(errno.EISDIR), number=errno.EISDIR)
         self._interpolated = np.zeros(len(track.channels), np.int64)
         self._sums: dict[Path, str] = {}
         self._writer = WavWriter(
