@@ -91,8 +91,9 @@ def _sound(motion: list[GrooveMotion], capture: Capture, recipe: Recipe, directi
     velocities = [m.lateral_velocity_m_s if direction == "lateral" else m.vertical_velocity_m_s for m in motion]
     if not any(np.isfinite(velocity).any() for velocity in velocities):
         return None
-    resampler = Resampler(capture.bench.rotation, direction, RATE_HZ, recipe.passband)
-    pieces = list(resampler.resample(motion))
+    resampler = Resampler(capture.bench.rotation, RATE_HZ, recipe.passband)
+    both = resampler.resample(motion)
+    pieces = [piece.lateral if direction == "lateral" else piece.vertical for piece in both]
     return Audio(
         start_sample=pieces[0].start_sample,
         rate_hz=RATE_HZ,

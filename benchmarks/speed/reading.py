@@ -98,7 +98,7 @@ def following_stages(capture: Capture, traces: list[WallTrace]) -> list[Row]:
     spliced: list[WallTrace] = []
     motion: list[GrooveMotion] = []
     arm = Tonearm(bench.rotation, direction, bench.disc.wall_angle_rad, bench.passage_length_m, recipe.smoother)
-    resampler = Resampler(bench.rotation, direction, 96_000.0, recipe.passband)
+    resampler = Resampler(bench.rotation, 96_000.0, recipe.passband)
     list(arm.follow(trace for trace, _ in recipe.splice.join(iter(traces))))  # compiles
     return [
         ("splice", timed(lambda: spliced.extend(t for t, _ in recipe.splice.join(iter(traces))), count), 0.0),

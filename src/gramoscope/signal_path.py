@@ -7,7 +7,9 @@
     WallTrace                      both walls of one stretch, with error bars
       │ tonearm                    splice → smooth
     GrooveMotion                   the groove's velocity along the whole passage, piece by piece
-      │ preamp                     place → time, resample, recording characteristic
+      │ preamp                     place → time
+    GrooveSound                    both directions in time, piece by piece
+      │ preamp                     the sound of the cut, of the walls; recording characteristic
     Audio                          sound, piece by piece
       │ listening                  files, comparison, figures, report
 
@@ -189,3 +191,18 @@ class Audio:
     sigma: FloatArray
     flags: FlagArray
     history: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class GrooveSound:
+    """A piece of the groove's motion in time, both directions at the same moments.
+
+    Attributes
+    ----------
+    lateral, vertical : Audio
+        Velocity towards +l and +z. Samples of a direction that could not be read are 0, flagged `INTERPOLATED`, with NaN
+        for their sigma.
+    """
+
+    lateral: Audio
+    vertical: Audio

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import signal
 import subprocess
@@ -92,17 +93,60 @@ def test_filming_stopped_by_ctrl_c_leaves_nothing(
     assert _names(tmp_path) == set()
 
 
-@pytest.mark.parametrize("sign", ["out/.flat.wav.*.part", "out/.report.json.*.part"])
-def test_playing_killed_leaves_only_hidden_files_and_can_be_repeated(
-    gramoscope: Callable[..., Any], longer_capture: Path, quickly: tuple[str, ...], tmp_path: Path, sign: str
+def _require_valid(file: Path) -> None:
+    """Read a file to its end, by its kind."""
+    if file.suffix == ".sha256":
+        digest, name = file.read_text(encoding="utf-8").split()
+        assert hashlib.sha256(file.with_name(name).read_bytes()).hexdigest() == digest
+    elif file.suffix == ".json":
+        json.loads(file.read_text(encoding="utf-8"))
+    elif file.suffix in (".wav", ".flac"):
+        samples, _ = soundfile.read(file)
+        assert samples.size == soundfile.info(file).frames * soundfile.info(file).channels
+    else:
+        assert file.read_bytes()[-12:-4] == b"\0\0\0\0IEND", "a whole picture"
+
+
+KILLED_AT = [
+    ("out/.flat.wav.*.part", 0.4),
+    ("out/.equalised.wav.sha256.*.part", 0.0),
+    ("out/flat.wav", 0.0),
+    ("out/walls.wav.sha256", 0.0),
+]
+
+
+@pytest.mark.parametrize(("sign", "wait_s"), KILLED_AT, ids=[f"{sign}+{wait_s}" for sign, wait_s in KILLED_AT])
+def test_playing_killed_leaves_nothing_or_valid_files(
+    longer_capture: Path, quickly: tuple[str, ...], tmp_path: Path, sign: str, wait_s: float
+) -> None:
+    """What has a name of its own is whole; a sound under its hidden name is valid as far as it goes."""
+    out = tmp_path / "out"
+    play = ("play", longer_capture, "--out", out, "--quiet", *quickly)
+    code, said = _signalled(tmp_path, sign, signal.SIGKILL, *play, wait_s=wait_s)
+    # the last moments may have passed before the signal came
+    assert code in (-signal.SIGKILL, 0), said
+    for file in out.iterdir():
+        if not file.name.startswith("."):
+            _require_valid(file)
+        elif ".wav." in file.name and ".sha256." not in file.name and file.stat().st_size > 0:
+            assert soundfile.info(file).samplerate == 96_000
+    if (out / "report.json").exists():
+        report = json.loads((out / "report.json").read_text(encoding="utf-8"))
+        assert {*report["files"], "report.json", "groove.png"} <= _names(out)
+
+
+def test_a_killed_transfer_can_be_repeated(
+    gramoscope: Callable[..., Any], longer_capture: Path, quickly: tuple[str, ...], tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    code, _ = _signalled(tmp_path, sign, signal.SIGKILL, "play", longer_capture, "--out", out, *quickly)
+    code, _ = _signalled(
+        tmp_path, "out/.flat.wav.*.part", signal.SIGKILL, "play", longer_capture, "--out", out, *quickly
+    )
     assert code == -signal.SIGKILL
     assert all(name.startswith(".") for name in _names(out))
     assert gramoscope("play", longer_capture, "--out", out, "--quiet", *quickly).code == 0
     report = json.loads((out / "report.json").read_text(encoding="utf-8"))
-    for name in ("flat.wav", "equalised.wav"):
+    for name in report["files"]:
         assert soundfile.info(out / name).duration == pytest.approx(report["seconds"])
 
 

@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import soundfile
+import wavinfo
 
 COMMAND = [sys.executable, "-c", "import sys; from gramoscope.cli.main import main; sys.exit(main())"]
 COMMANDS = ("demo", "film", "play", "compare", "info", "recipe")
@@ -36,11 +38,39 @@ def test_play_tells_what_the_transfer_is_worth_and_where_it_lies(
     assert answer.code == 0
     for words in ("0.003 s in", "recipe seed-paper", "6 read, 0 lost; 0 frames lost", "cm/s rms", "dB below the sound"):
         assert words in answer.out
-    for name in ("flat.wav", "equalised.wav", "groove.png", "report.json"):
+    for name in ("flat.wav", "walls.wav", "vertical.wav", "equalised.wav", "groove.png", "report.json"):
         assert str(tmp_path / "o" / name) in answer.out
         assert (tmp_path / "o" / name).stat().st_size > 500
     assert "6/6" in answer.err, "the bar"
     assert "Playing" not in answer.out
+
+
+def test_play_writes_the_archives_words_and_flac_and_tells_what_was_clipped(
+    gramoscope: Callable[..., Any], capture: Path, quickly: tuple[str, ...], tmp_path: Path
+) -> None:
+    words = ("--title", "Jánošík", "--originator", "The archive", "--reference", "A/1", "--description", "Side B")
+    sound = ("--flac", "--full-scale-cm-s", 1)
+    answer = gramoscope("play", capture, "--out", tmp_path / "o", *words, *sound, *quickly)
+    assert answer.code == 0
+    assert str(tmp_path / "o" / "walls.flac") in answer.out
+    assert "beyond full scale (1 cm/s) were clipped; play again with --full-scale-cm-s 2" in answer.out
+    bext = wavinfo.WavInfoReader(str(tmp_path / "o" / "flat.wav")).bext
+    assert (bext.originator, bext.originator_ref) == ("The archive", "A/1")
+    assert bext.description.startswith("Side B. ")
+    with soundfile.SoundFile(tmp_path / "o" / "flat.flac") as file:
+        assert file.title == "Jánošík"
+
+
+def test_compare_takes_the_scale_of_each_file_into_account(
+    gramoscope: Callable[..., Any], capture: Path, heard: Path, quickly: tuple[str, ...], tmp_path: Path
+) -> None:
+    played = ("play", capture, "--out", tmp_path / "o", "--full-scale-cm-s", 200, "--flac", "--quiet", *quickly)
+    assert gramoscope(*played).code == 0
+    for copy in ("flat.wav", "flat.flac"):
+        two = (heard / "flat.wav", tmp_path / "o" / copy)
+        found = json.loads(gramoscope("compare", *two, "--band", 900, 9000, "--json").out)
+        assert found["gain_db"] == pytest.approx(0, abs=0.001)
+        assert found["waveform_r"] == pytest.approx(1)
 
 
 def test_play_names_the_groups_that_are_lost(
@@ -121,8 +151,6 @@ def test_compare_of_a_sound_with_itself_finds_nothing_between_them(gramoscope: C
 def test_compare_hears_that_a_sound_is_upside_down_late_and_soft(
     gramoscope: Callable[..., Any], tone: Path, tmp_path: Path
 ) -> None:
-    import soundfile
-
     sound, rate_hz = soundfile.read(tone)
     soundfile.write(tmp_path / "copy.wav", -0.5 * sound[441:9000], rate_hz, subtype="PCM_24")
     found = json.loads(gramoscope("compare", tone, tmp_path / "copy.wav", "--start", 0.01, "--json").out)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from gramoscope.apparatus.capture_writer import CaptureWriter
 from gramoscope.conventions import BoolArray, FloatArray
 from gramoscope.pickup.cartridge import Pickup
 from gramoscope.player import play as play_module
+from gramoscope.player.catalogue import Catalogue
 from gramoscope.player.monitor import Monitor
 from gramoscope.player.recipe import load_recipe
 from gramoscope.signal_path import ImageArray
@@ -29,6 +31,8 @@ from gramoscope.simulation.truth import truth_audio
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 GROUPS, FRAMES = 8, 4
+MADE = datetime(2031, 2, 13, 14, 15, 16, 170, tzinfo=UTC)
+"""Transfers made at the same moment are the same to the byte."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +81,7 @@ class Played:
 
 def play_capture(capture: Path, out: Path, *, recipe: str = "seed-paper", **settings: Any) -> Played:
     """Play a capture; the report is read from the file, not from memory."""
+    settings.setdefault("catalogue", Catalogue(made=MADE))
     monitors: list[Monitor] = []
     draw = play_module.groove_picture
 

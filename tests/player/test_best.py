@@ -41,9 +41,18 @@ def test_the_bits_depend_neither_on_the_workers_nor_on_how_the_film_is_kept(
 ) -> None:
     folder = film.write(tmp_path / "capture", layout=layout, **sensor)
     other = played(folder, tmp_path / "out", recipe="best", workers=workers)
-    assert other.bits("flat.wav") == best.bits("flat.wav")
+    for name in ("flat.wav", "walls.wav", "vertical.wav", "equalised.wav"):
+        assert other.bits(name) == best.bits(name), name
     for key in ("share", "noise_estimate", "flagged_samples", "calibration"):
         assert other.report[key] == best.report[key], key
+
+
+def test_both_walls_together_are_the_sound_and_apart_the_vertical_motion(best: Any) -> None:
+    outer, inner = best["walls.wav"].T
+    assert np.abs((outer + inner) / np.sqrt(2) - best["flat.wav"]).max() < 3 * 2**-23
+    assert np.abs((outer - inner) / np.sqrt(2) - best["vertical.wav"]).max() < 3 * 2**-23
+    assert np.corrcoef(outer, inner)[0, 1] > 0.9, "a lateral cut"
+    assert 0 < best["vertical.wav"].std() < 0.2 * best["flat.wav"].std()
 
 
 def test_the_report_says_what_the_passage_taught(film: Any, best: Any) -> None:

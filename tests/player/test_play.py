@@ -18,6 +18,7 @@ from gramoscope.player.recipe import load_recipe
 
 RATE_HZ = 96_000
 FULL_SCALE_M_S = 0.5
+SOUNDS = ("flat.wav", "walls.wav", "vertical.wav", "equalised.wav")
 
 
 def test_the_film_sounds_as_the_groove_moves(film: Any, transfer: Any) -> None:
@@ -36,9 +37,10 @@ def test_sample_zero_is_the_first_column_of_the_film(film: Any, transfer: Any) -
 def test_the_sound_is_as_long_as_the_film(film: Any, transfer: Any) -> None:
     bench = film.scene.bench
     seconds = float(bench.rotation.time_of_arc_s(bench.passage_length_m))
-    for name in ("flat.wav", "equalised.wav"):
+    for name in SOUNDS:
         file = soundfile.info(transfer.folder / name)
-        assert (file.samplerate, file.channels, file.subtype) == (RATE_HZ, 1, "PCM_24")
+        channels = 2 if name == "walls.wav" else 1
+        assert (file.samplerate, file.channels, file.subtype) == (RATE_HZ, channels, "PCM_24")
         assert abs(file.frames - seconds * RATE_HZ) < 0.01 * RATE_HZ * seconds
     assert transfer.report["seconds"] == pytest.approx(soundfile.info(transfer.folder / "flat.wav").duration)
 
@@ -48,8 +50,54 @@ def test_the_bits_do_not_depend_on_the_number_of_workers(
     capture: Path, transfer: Any, played: Callable[..., Any], tmp_path: Path, workers: int
 ) -> None:
     other = played(capture, tmp_path / "out", workers=workers)
-    for name in ("flat.wav", "equalised.wav", "groove.png"):
+    for name in (*SOUNDS, *(f"{name}.sha256" for name in SOUNDS), "groove.png"):
         assert other.bits(name) == transfer.bits(name), name
+
+
+def test_the_folder_holds_every_sound_its_sum_the_picture_and_the_report(transfer: Any) -> None:
+    names = {*SOUNDS, *(f"{name}.sha256" for name in SOUNDS), "groove.png", "report.json"}
+    assert {path.name for path in transfer.folder.iterdir()} == names
+    assert tuple(transfer.report["files"]) == SOUNDS
+
+
+def test_of_one_wall_the_other_channel_is_silent_and_that_is_said(film: Any, transfer: Any) -> None:
+    (read,) = transfer.report["walls_read"]
+    channels = dict(zip(("outer", "inner"), transfer["walls.wav"].T, strict=True))
+    flat = transfer["flat.wav"]
+    assert np.abs(channels[read] - flat / np.sqrt(2)).max() < 1.5 * 2**-23
+    silent = "inner" if read == "outer" else "outer"
+    assert not channels[silent].any()
+    assert not transfer["vertical.wav"].any()
+    missing = transfer.report["files"]["walls.wav"]["interpolated_samples"]
+    assert missing[silent] == flat.size
+    assert missing[read] < 0.05 * flat.size
+    assert transfer.report["files"]["vertical.wav"]["interpolated_samples"] == {"groove": flat.size}
+    assert f"the {silent} wall is silent" in transfer.report["remarks"][0]
+
+
+def test_another_full_scale_is_the_same_sound_and_what_does_not_fit_is_told(
+    capture: Path, transfer: Any, played: Callable[..., Any], tmp_path: Path
+) -> None:
+    small = played(capture, tmp_path / "out", full_scale_m_s=0.02)
+    flat, softer = transfer["flat.wav"] * FULL_SCALE_M_S / 0.02, small["flat.wav"]
+    np.testing.assert_allclose(softer, np.clip(flat, -1, 1), atol=1e-5)
+    clipped = int(np.count_nonzero(np.abs(flat) > 1))
+    assert small.report["files"]["flat.wav"]["clipped_samples"] == clipped > 0
+    (remark,) = (remark for remark in small.report["remarks"] if remark.startswith("flat.wav"))
+    assert f"{clipped} samples" in remark
+    assert "--full-scale-cm-s 4" in remark
+    assert not any("clipped" in remark for remark in transfer.report["remarks"])
+
+
+def test_flac_comes_beside_each_sound_when_asked_for(
+    capture: Path, transfer: Any, played: Callable[..., Any], tmp_path: Path
+) -> None:
+    other = played(capture, tmp_path / "out", flac=True)
+    for name in SOUNDS:
+        assert other.bits(name) == transfer.bits(name)
+        flac = name.replace(".wav", ".flac")
+        np.testing.assert_array_equal(other[flac], transfer[name])
+        assert other.report["files"][name]["flac"]["name"] == flac
 
 
 CAMERAS = [
@@ -121,9 +169,18 @@ def test_an_impossible_rate_is_refused_before_anything_is_read(rate_hz: float) -
         Settings(rate_hz=rate_hz)
 
 
-def test_no_workers_are_refused() -> None:
-    with pytest.raises(ArgumentError, match="0 workers"):
-        Settings(workers=0)
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"workers": 0}, "0 workers"),
+        ({"full_scale_m_s": 0.0}, "full scale"),
+        ({"full_scale_m_s": float("nan")}, "full scale"),
+        ({"flac": True, "rate_hz": 700_000.0}, "FLAC"),
+    ],
+)
+def test_impossible_settings_are_refused(wrong: dict[str, Any], words: str) -> None:
+    with pytest.raises(ArgumentError, match=words):
+        Settings(**wrong)
 
 
 def test_progress_is_told_after_every_group(capture: Path, tmp_path: Path) -> None:

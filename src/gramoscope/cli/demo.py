@@ -36,11 +36,13 @@ def demo(
     from gramoscope.cli import compare as compare_command
     from gramoscope.cli import play as play_command
     from gramoscope.errors import require
+    from gramoscope.listening.broadcast_metadata import BroadcastMetadata
+    from gramoscope.listening.broadcast_wave import WavWriter
     from gramoscope.listening.compare import compare
     from gramoscope.listening.comparison_figure import comparison_figure
     from gramoscope.listening.ink import save_png
     from gramoscope.listening.pair import at_rate
-    from gramoscope.listening.wav import WavWriter, read_sound
+    from gramoscope.listening.wav import read_sound
     from gramoscope.player.play import Settings, play
     from gramoscope.player.recipe import DEFAULT_RECIPE, load_recipe
     from gramoscope.simulation.demo_sound import demo_sound
@@ -58,7 +60,8 @@ def demo(
     terminal.say(f"1. Cutting {seconds:g} s of a sung melody into a record and filming its groove …")
     with terminal.progress("Filming") as progress:
         film_sound(sound, rate_hz, scene, capture, "tiff", overwrite=True, workers=workers, progress=progress)
-    with WavWriter(out / "original.wav", rate_hz=rate_hz, full_scale_m_s=1.0) as original:
+    said = BroadcastMetadata(description="what was cut into the demonstration's record")
+    with WavWriter(out / "original.wav", rate_hz=rate_hz, full_scale_m_s=1.0, metadata=said) as original:
         original.write(0.9 * sound)
     terminal.say("2. Playing the film …")
     opened, settings = open_capture(capture), Settings(characteristic_name="flat", workers=workers)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from gramoscope.cli.terminal import FINE, PROCESSORS, Terminal, Workers, several
+from gramoscope.cli.terminal import FINE, FINITE, PROCESSORS, Terminal, Workers, several
 
 SHOWN_GROUPS = 8
 
@@ -20,14 +20,21 @@ def play(
     recipe: str = "best",
     rate: int = 96_000,
     characteristic: str | None = None,
+    flac: bool = False,
+    full_scale_cm_s: Annotated[float, FINITE] = 50.0,
+    title: str = "",
+    originator: str = "",
+    reference: str = "",
+    description: str = "",
     workers: Workers = PROCESSORS,
     quiet: bool = False,
     json: bool = False,
 ) -> int:
     """Play a filmed record.
 
-    Writes `flat.wav` (velocity of the groove in the direction of the cut, 24 bit, no equalisation), `equalised.wav`,
-    `report.json` and `groove.png` into DIR: all of them, or nothing.
+    Writes into DIR, all of them or nothing: `flat.wav` (velocity of the groove in the direction of the cut, no equalisation),
+    `walls.wav` (outer and inner wall for themselves), `vertical.wav` (up and down), `equalised.wav`, each Broadcast Wave of
+    24 bit with its SHA-256 beside it; `report.json` and `groove.png`.
 
     What the film does not show (a chipped wall, a lost frame) is bridged, flagged and counted in the report.
 
@@ -44,6 +51,20 @@ def play(
     characteristic
         Recording characteristic to undo in `equalised.wav`: riaa, flat, aes, nab, columbia-lp, european-78, … As the capture
         says when left out, riaa (as in the paper) if it does not.
+    flac
+        Write every sound as FLAC too: the same samples in about half the room.
+    full_scale_cm_s
+        Groove velocity at full scale (0 dBFS). The same for all files and for quiet and loud records alike: nothing is
+        normalised. What lies beyond is clipped, counted and told.
+    title
+        Title of the recording; as the capture says when left out.
+    originator
+        Who makes the transfer: the name of your archive, 32 characters at the most.
+    reference
+        Your mark for it, a shelf or accession number, 32 characters at the most; the capture's name when left out.
+    description
+        What the files shall say first of themselves, 256 characters at the most; title, performer, label, matrix, side and
+        date of the capture when left out.
     workers
         Stretches read at the same time; one for each processor when left out. The result does not depend on it.
     quiet
@@ -52,6 +73,7 @@ def play(
         Print the report as JSON.
     """
     from gramoscope.apparatus.capture import open_capture
+    from gramoscope.player.catalogue import Catalogue
     from gramoscope.player.play import Settings
     from gramoscope.player.play import play as play_capture
     from gramoscope.player.recipe import load_recipe
@@ -59,7 +81,8 @@ def play(
     terminal = Terminal(quiet, json)
     opened = open_capture(capture)
     name = characteristic or opened.bench.disc.characteristic or "riaa"
-    settings = Settings(rate_hz=float(rate), characteristic_name=name, workers=workers)
+    catalogue = Catalogue(title=title, originator=originator, reference=reference, description=description)
+    settings = Settings(float(rate), name, workers, full_scale_cm_s / 100, flac, catalogue)
     with terminal.progress("Playing") as progress:
         report = play_capture(opened, load_recipe(recipe), out, settings, progress=progress)
     terminal.result(report)
@@ -77,7 +100,7 @@ def tell(terminal: Terminal, report: Mapping[str, Any], out: Path) -> None:
         "level": f"{level['rms_cm_s']:.2f} cm/s rms, {level['peak_cm_s']:.1f} cm/s peak",
         "noise": f"{noise['sigma_rms_cm_s']:.2f} cm/s rms by the error bars, {_below(noise)}",
         "equalised": f"{report['files']['equalised.wav']['characteristic']}",
-        "files": "  ".join(str(out / name) for name in ("flat.wav", "equalised.wav", "groove.png", "report.json")),
+        "files": "  ".join(str(out / name) for name in _names(report)),
     }
     terminal.table(rows)
     for remark in report["remarks"]:
@@ -87,6 +110,11 @@ def tell(terminal: Terminal, report: Mapping[str, Any], out: Path) -> None:
     more = len(report["problems"]) - 5 + report["problems_not_listed"]
     if more > 0:
         terminal.say(f"[yellow]Found:[/] {more} more problems; they are in report.json")
+
+
+def _names(report: Mapping[str, Any]) -> list[str]:
+    sounds = [[name, *([file["flac"]["name"]] if "flac" in file else [])] for name, file in report["files"].items()]
+    return [*(name for names in sounds for name in names), "groove.png", "report.json"]
 
 
 def _groups(report: Mapping[str, Any]) -> str:

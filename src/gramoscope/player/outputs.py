@@ -3,34 +3,45 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 from matplotlib.figure import Figure
 
 from gramoscope.errors import OutputError
 from gramoscope.interruption import ctrl_c_waits
+from gramoscope.listening.broadcast_metadata import BroadcastMetadata
 from gramoscope.listening.ink import save_png
 from gramoscope.listening.report import json_text
-from gramoscope.listening.wav import WavWriter
 from gramoscope.listening.whole_file import written_whole
+from gramoscope.player.track_file import TrackFile
+from gramoscope.player.tracks import Track
+from gramoscope.signal_path import Audio
 
-FLAT, EQUALISED, REPORT, PICTURE = "flat.wav", "equalised.wav", "report.json", "groove.png"
+REPORT, PICTURE = "report.json", "groove.png"
+Piece = TypeVar("Piece")
 
 
 class Outputs:
     """Writes the files of a transfer into a folder; use it in a `with` statement.
 
     Sound grows in temporary files. At the end of the block everything is put under its name, the report last; a block
-    that fails, or is interrupted, leaves nothing behind, and an earlier transfer in the same folder as it was.
+    that fails, or is interrupted, leaves nothing behind, and an earlier transfer in the same folder as it was. One that is
+    killed leaves temporary files (valid ones), or some of the final files, each whole, and no report.
 
     Parameters
     ----------
     folder : Path
         Made if it does not exist.
+    tracks : mapping of Track to BroadcastMetadata
+        The sound files, and what each says of itself.
     rate_hz : float
+    full_scale_m_s : float
+        The velocity that is ±1 in every file.
+    flac : bool
+        Write every sound as FLAC too.
 
     Raises
     ------
@@ -38,9 +49,19 @@ class Outputs:
         If something cannot be written.
     """
 
-    def __init__(self, folder: Path, *, rate_hz: float) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        tracks: Mapping[Track, BroadcastMetadata],
+        *,
+        rate_hz: float,
+        full_scale_m_s: float,
+        flac: bool = False,
+    ) -> None:
         self.folder = folder
-        self._rate_hz = rate_hz
+        self._tracks = tracks
+        self._rate_hz, self._full_scale_m_s, self._flac = rate_hz, full_scale_m_s, flac
+        self._files: dict[Track, TrackFile] = {}
         self._made: list[Path] = []
 
     def __enter__(self) -> Self:
@@ -48,18 +69,50 @@ class Outputs:
             with ctrl_c_waits():
                 undo.callback(self._remove_made)
                 self._make_folder()
-                self.flat = WavWriter(self.folder / FLAT, rate_hz=self._rate_hz)
-                undo.callback(self.flat.discard)
-                self.equalised = WavWriter(self.folder / EQUALISED, rate_hz=self._rate_hz)
-                undo.callback(self.equalised.discard)
+                for track, metadata in self._tracks.items():
+                    self._files[track] = TrackFile(
+                        self.folder,
+                        track,
+                        metadata,
+                        rate_hz=self._rate_hz,
+                        full_scale_m_s=self._full_scale_m_s,
+                        flac=self._flac,
+                    )
+                    undo.callback(self._files[track].discard)
             undo.pop_all()
         return self
+
+    def kept(
+        self, track: Track, pieces: Iterable[Piece], channels: Callable[[Piece], Sequence[Audio]]
+    ) -> Iterator[Piece]:
+        """Write pieces into a track as they pass by.
+
+        Parameters
+        ----------
+        track : Track
+            One of those that were given.
+        pieces : iterable
+        channels : callable
+            Returns the sounds that a piece is in the file, one for each channel.
+
+        Yields
+        ------
+        The pieces as they came.
+        """
+        for piece in pieces:
+            self._files[track].write(channels(piece))
+            yield piece
+
+    def complete(self) -> dict[str, Any]:
+        """Finish all sound under temporary names; return what became of each file, for the report."""
+        for file in self._files.values():
+            file.complete()
+        return {track.name: file.as_dict() for track, file in self._files.items()}
 
     def finish(self, report: Mapping[str, Any], picture: Figure) -> None:
         """Complete everything under temporary names, then put all of it in place."""
         text = json_text(report)
-        self.flat.finish()
-        self.equalised.finish()
+        self.complete()
         report_whole, picture_whole = (written_whole(self.folder / name) for name in (REPORT, PICTURE))
         with contextlib.ExitStack() as holding, report_whole as report_part, picture_whole as picture_part:
             report_part.write_text(text, encoding="utf-8")
@@ -68,14 +121,16 @@ class Outputs:
             # nothing large is left to do: from here on an old transfer makes way. Whoever sees a report sees a whole
             # transfer, so the old one goes first and the new one comes last, when the block ends
             (self.folder / REPORT).unlink(missing_ok=True)
-            self.flat.commit()
-            self.equalised.commit()
+            for file in self._files.values():
+                file.retire_older()
+            for file in self._files.values():
+                file.commit()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.flat.discard()
-        self.equalised.discard()
+        for file in self._files.values():
+            file.discard()
         if kind is not None:
             self._remove_made()
 

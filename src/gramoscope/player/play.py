@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -19,16 +19,21 @@ from gramoscope.apparatus.capture import Capture
 from gramoscope.disc.characteristics import characteristic
 from gramoscope.disc.formats import direction_of_cut
 from gramoscope.errors import CaptureError, require
+from gramoscope.listening.broadcast_wave import FULL_SCALE_M_S
+from gramoscope.listening.flac import HIGHEST_RATE_HZ as HIGHEST_FLAC_RATE_HZ
 from gramoscope.pickup.cartridge import Pickup
+from gramoscope.player.catalogue import Catalogue, metadata_of
 from gramoscope.player.monitor import OVERVIEW_POINTS, Monitor
 from gramoscope.player.outputs import Outputs
 from gramoscope.player.picture import groove_picture
 from gramoscope.player.provenance import InputHashes, hash_group
 from gramoscope.player.recipe import Recipe
 from gramoscope.player.report import transfer_report
+from gramoscope.player.tracks import EQUALISED, FLAT, TRACKS, VERTICAL, WALLS, alone, vertical
 from gramoscope.player.workers import in_order, spreading
 from gramoscope.preamp.equalisation import Equaliser
 from gramoscope.preamp.resample import Resampler
+from gramoscope.preamp.walls import WallSplitter, in_direction
 from gramoscope.signal_path import Audio, WallTrace
 from gramoscope.tonearm.follow import Tonearm
 
@@ -52,11 +57,20 @@ class Settings:
     characteristic_name : str
         Recording characteristic to undo in `equalised.wav`.
     workers : int
+    full_scale_m_s : float
+        The velocity that is ±1 in every sound file.
+    flac : bool
+        Write every sound as FLAC too.
+    catalogue : Catalogue
+        The archive's words.
     """
 
     rate_hz: float = 96_000.0
     characteristic_name: str = "riaa"
     workers: int = os.cpu_count() or 1
+    full_scale_m_s: float = FULL_SCALE_M_S
+    flac: bool = False
+    catalogue: Catalogue = field(default_factory=Catalogue)
 
     def __post_init__(self) -> None:
         possible = 1000 <= self.rate_hz <= 1_000_000 and self.rate_hz == round(self.rate_hz)
@@ -64,6 +78,17 @@ class Settings:
             possible, f"a rate of {self.rate_hz:g} Hz", "a whole number from 1000 to 1000000", "96000 for an archive"
         )
         require(self.workers >= 1, f"{self.workers} workers", "at least one")
+        require(
+            0 < self.full_scale_m_s <= 100,
+            f"a full scale of {100 * self.full_scale_m_s:g} cm/s",
+            "above 0, at most 10000",
+        )
+        require(
+            not self.flac or self.rate_hz <= HIGHEST_FLAC_RATE_HZ,
+            f"FLAC at {self.rate_hz:g} Hz",
+            f"{HIGHEST_FLAC_RATE_HZ} Hz at the most",
+            "leave FLAC out",
+        )
 
 
 def play(
@@ -76,7 +101,7 @@ def play(
     capture : Capture
     recipe : Recipe
     folder : Path
-        Where `flat.wav`, `equalised.wav`, `report.json` and `groove.png` go.
+        Where the tracks (`player.tracks`), `report.json` and `groove.png` go.
     settings : Settings
     progress : callable, optional
         Told how much is done, of how much, and of what ("Learning", "Playing").
@@ -97,20 +122,21 @@ def play(
     bench, direction = capture.bench, direction_of_cut(capture.bench.disc.cut)
     equaliser = Equaliser(characteristic(settings.characteristic_name))
     tonearm = Tonearm(bench.rotation, direction, bench.disc.wall_angle_rad, bench.passage_length_m, recipe.smoother)
-    resampler = Resampler(bench.rotation, direction, settings.rate_hz, recipe.passband)
+    resampler = Resampler(bench.rotation, settings.rate_hz, recipe.passband)
     hashes, monitor = InputHashes(), _monitor(capture, settings.rate_hz)
 
-    with Outputs(folder, rate_hz=settings.rate_hz) as files:
+    with _outputs(capture, recipe, folder, settings) as files:
         pickup = learned(capture, recipe, settings.workers, progress=progress)
         traces = _picked_up(capture, pickup, settings.workers, hashes, monitor, progress)
-        spliced = _spliced(traces, recipe, monitor)
-        motion = tonearm.follow(spliced)
-        flat = _written(resampler.resample(motion), files, monitor)
-        for piece in equaliser.equalise(flat):
-            files.equalised.write(piece.samples)
+        motion = tonearm.follow(_spliced(traces, recipe, monitor))
+        sound = files.kept(WALLS, resampler.resample(motion), WallSplitter(direction, pickup.walls).split)
+        sound = files.kept(VERTICAL, sound, vertical)
+        flat = files.kept(FLAT, _heard((in_direction(piece, direction) for piece in sound), monitor), alone)
+        for _ in files.kept(EQUALISED, equaliser.equalise(flat), alone):
+            pass
         _require_sound(monitor)
         report = transfer_report(
-            capture, recipe, pickup, settings, hashes, monitor, files, time.perf_counter() - started
+            capture, recipe, pickup, settings, hashes, monitor, files.complete(), time.perf_counter() - started
         )
         picture = groove_picture(capture, pickup, monitor, rate_hz=settings.rate_hz, recipe_name=recipe.name)
         files.finish(report, picture)
@@ -161,11 +187,16 @@ def _spliced(traces: Iterator[WallTrace], recipe: Recipe, monitor: Monitor) -> I
         yield trace
 
 
-def _written(pieces: Iterator[Audio], files: Outputs, monitor: Monitor) -> Iterator[Audio]:
+def _heard(pieces: Iterator[Audio], monitor: Monitor) -> Iterator[Audio]:
     for piece in pieces:
-        files.flat.write(piece.samples)
         monitor.heard(piece)
         yield piece
+
+
+def _outputs(capture: Capture, recipe: Recipe, folder: Path, settings: Settings) -> Outputs:
+    name = capture.folder.resolve().name
+    tracks = {track: metadata_of(track, capture.bench, recipe, settings, capture_name=name) for track in TRACKS}
+    return Outputs(folder, tracks, rate_hz=settings.rate_hz, full_scale_m_s=settings.full_scale_m_s, flac=settings.flac)
 
 
 def _monitor(capture: Capture, rate_hz: float) -> Monitor:

@@ -66,7 +66,7 @@ def _kaiser_beta() -> float:
 def interpolate_reference(
     samples: FloatArray, places: FloatArray, stretch: FloatArray, *, passband: float
 ) -> FloatArray:
-    """Return what `interpolate` returns, from g itself and in NumPy: slow, and easy to believe."""
+    """Return what `interpolate` returns for one signal, from g itself and in NumPy: slow, and easy to believe."""
     index = np.arange(samples.size)
     values = [
         np.sum(samples * c * low_pass(c * (index - u), passband=passband)) for u, c in zip(places, stretch, strict=True)
@@ -78,12 +78,12 @@ def interpolate_reference(
 def interpolate(
     samples: FloatArray, places: FloatArray, stretch: FloatArray, table: FloatArray, reach: int
 ) -> FloatArray:
-    """Return a sampled signal's band-limited values at places between its samples.
+    """Return sampled signals' band-limited values at places between their samples.
 
     Parameters
     ----------
-    samples : float64 array, shape (sample,)
-        Finite. Taken as 0 beyond both ends.
+    samples : float64 array, shape (signal, sample)
+        Signals on one grid. Finite. Taken as 0 beyond both ends.
     places : float64 array, shape (value,)
         u, in samples.
     stretch : float64 array, shape (value,)
@@ -93,26 +93,30 @@ def interpolate(
 
     Returns
     -------
-    float64 array, shape (value,)
+    float64 array, shape (signal, value)
         Each value depends only on the samples within reach/c of it, added up in their order.
     """
-    values = np.empty(places.size)
+    values = np.zeros((samples.shape[0], places.size))
     for n in range(places.size):
-        values[n] = _value_at(samples, places[n], stretch[n], table, reach)
+        _add_up(samples, places[n], stretch[n], table, reach, values[:, n])
     return values
 
 
 @numba.njit(cache=True, nogil=True)
-def _value_at(samples: FloatArray, place: float, stretch: float, table: FloatArray, reach: int) -> float:
+def _add_up(
+    samples: FloatArray, place: float, stretch: float, table: FloatArray, reach: int, values: FloatArray
+) -> None:
     # split first, so that the same place in a longer array is computed from the same numbers, to the last bit
     middle = int(np.floor(place))
     beyond = place - middle
     first = max(int(np.ceil(beyond - reach / stretch)), -middle)
-    last = min(int(np.floor(beyond + reach / stretch)), samples.size - 1 - middle)
-    total = 0.0
+    last = min(int(np.floor(beyond + reach / stretch)), samples.shape[1] - 1 - middle)
     for k in range(first, last + 1):
         steps = abs(k - beyond) * stretch * TABLE_STEPS
         i = int(steps)
         t = steps - i
-        total += samples[middle + k] * (table[i, 0] + t * (table[i, 1] + t * (table[i, 2] + t * table[i, 3])))
-    return total * stretch
+        weight = table[i, 0] + t * (table[i, 1] + t * (table[i, 2] + t * table[i, 3]))
+        for signal in range(values.size):
+            values[signal] += samples[signal, middle + k] * weight
+    for signal in range(values.size):
+        values[signal] *= stretch

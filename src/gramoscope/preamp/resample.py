@@ -15,11 +15,10 @@ from itertools import chain
 import numpy as np
 
 from gramoscope.conventions import FloatArray
-from gramoscope.disc.formats import Direction
 from gramoscope.errors import require
 from gramoscope.preamp.interpolation import half_width, interpolate, low_pass_table
 from gramoscope.quality import FlagArray, Quality, no_flags
-from gramoscope.signal_path import Audio, GrooveMotion
+from gramoscope.signal_path import Audio, GrooveMotion, GrooveSound
 from gramoscope.turntable.rotation import Rotation
 
 DEFAULT_PASSBAND = 0.91
@@ -28,14 +27,12 @@ DEFAULT_PASSBAND = 0.91
 
 @dataclass(frozen=True)
 class Resampler:
-    """Turns the groove's motion along s into sound at an even rate.
+    """Turns the groove's motion along s, in both directions, into sound at an even rate.
 
     Parameters
     ----------
     rotation : Rotation
         How the record was meant to turn.
-    direction : {"lateral", "vertical"}
-        Which motion is the sound.
     rate_hz : float
         Of the sound.
     passband : float
@@ -44,29 +41,26 @@ class Resampler:
     """
 
     rotation: Rotation
-    direction: Direction = "lateral"
     rate_hz: float = 96_000.0
     passband: float = DEFAULT_PASSBAND
 
     def __post_init__(self) -> None:
-        require(
-            self.direction in ("lateral", "vertical"), f"direction is {self.direction!r}", '"lateral" or "vertical"'
-        )
         require(self.rate_hz > 0, f"a rate of {self.rate_hz} Hz", "a positive rate", "96000 for an archive")
         require(0 < self.passband <= 0.98, f"a passband of {self.passband}", "a share between 0 and 0.98")
 
-    def resample(self, pieces: Iterable[GrooveMotion]) -> Iterator[Audio]:
+    def resample(self, pieces: Iterable[GrooveMotion]) -> Iterator[GrooveSound]:
         """Return the motion as sound; sample 0 lies exactly at s = 0.
 
         Parameters
         ----------
         pieces : iterable of GrooveMotion
             Following each other without gap on one grid. Each sample stands for the stretch from its place to the next.
-            A NaN velocity counts as 0 and is flagged `INTERPOLATED`; it should have been filled before.
+            A NaN velocity counts as 0 and is flagged `INTERPOLATED`, in its own direction alone; in the direction of the
+            cut it should have been filled before.
 
         Yields
         ------
-        Audio
+        GrooveSound
             The same samples, whatever the pieces they came in; their number is the time from s = 0 to the end of the
             grid, times the rate, rounded down. Before its first and after its last sample the grid is taken to hold
             their values; sound samples nearer to an end than the half width of the low-pass carry `EDGE`, and those
@@ -87,10 +81,10 @@ class Resampler:
             return
         grid = _Grid.of(first, self)
         table = low_pass_table(self.passband)
-        stock, done = _lead_in(first, grid, self.direction), 0
+        stock, done = _lead_in(first, grid), 0
         for piece in chain([first], pieces):
             _require_next(piece, grid, end=stock.end)
-            stock = stock.followed_by(_in_direction(piece, self.direction, start=stock.end))
+            stock = stock.followed_by(_Stock.of(piece, start=stock.end))
             ready = grid.sounds_before(stock.end - grid.reach)
             if ready > done:
                 yield _sound(stock, grid, table, sounds=(done, ready), end=np.inf)
@@ -114,7 +108,6 @@ class _Grid:
     reach: int
     half_width: int
     resampler: Resampler
-    history: str
 
     @classmethod
     def of(cls, first: GrooveMotion, resampler: Resampler) -> _Grid:
@@ -122,11 +115,7 @@ class _Grid:
         width = half_width(resampler.passband)
         reach = int(np.ceil(width * max(1.0, fastest / first.arc_step_m / resampler.rate_hz))) + 2
         late = int(np.ceil(max(0.0, first.arc_start_m / first.arc_step_m)))
-        history = (
-            f"{resampler.direction} motion resampled from every {first.arc_step_m * 1e6:.4g} µm "
-            f"to {resampler.rate_hz:g} Hz at {resampler.rotation.rpm:g} rpm"
-        )
-        return cls(first.arc_start_m, first.arc_step_m, reach + late, reach, width, resampler, history)
+        return cls(first.arc_start_m, first.arc_step_m, reach + late, reach, width, resampler)
 
     def sounds_before(self, place: float) -> int:
         """Return how many samples of sound lie before a place."""
@@ -145,90 +134,98 @@ class _Grid:
         speed = self.resampler.rotation.speed_at_m_s(arc)
         return np.minimum(1.0, self.resampler.rate_hz * self.arc_step_m / speed)
 
+    def history(self, direction: str) -> str:
+        """Return what was done, in words for the archive."""
+        rotation, rate_hz = self.resampler.rotation, self.resampler.rate_hz
+        return (
+            f"{direction} motion resampled from every {self.arc_step_m * 1e6:.4g} µm "
+            f"to {rate_hz:g} Hz at {rotation.rpm:g} rpm"
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class _Stock:
-    """The grid samples at hand, from the place `start`."""
+    """The grid samples at hand, from the place `start`; shape (direction, sample), lateral first."""
 
     start: int
     velocity_m_s: FloatArray
     sigma_m_s: FloatArray
     flags: FlagArray
 
+    @classmethod
+    def of(cls, piece: GrooveMotion, *, start: int) -> _Stock:
+        velocity = np.stack([piece.lateral_velocity_m_s, piece.vertical_velocity_m_s])
+        sigma = np.stack([piece.lateral_sigma_m_s, piece.vertical_sigma_m_s])
+        missing = np.isnan(velocity)
+        flags = np.where(missing, piece.flags | np.uint16(Quality.INTERPOLATED), piece.flags).astype(np.uint16)
+        return cls(start, np.where(missing, 0.0, velocity), sigma, flags)
+
     @property
     def end(self) -> int:
-        return self.start + self.flags.size
+        return self.start + int(self.flags.shape[1])
 
     def followed_by(self, other: _Stock) -> _Stock:
         return _Stock(
             self.start,
-            np.concatenate([self.velocity_m_s, other.velocity_m_s]),
-            np.concatenate([self.sigma_m_s, other.sigma_m_s]),
-            np.concatenate([self.flags, other.flags]),
+            np.concatenate([self.velocity_m_s, other.velocity_m_s], axis=1),
+            np.concatenate([self.sigma_m_s, other.sigma_m_s], axis=1),
+            np.concatenate([self.flags, other.flags], axis=1),
         )
 
     def since(self, place: int) -> _Stock:
         kept = slice(max(place - self.start, 0), None)
-        return _Stock(max(place, self.start), self.velocity_m_s[kept], self.sigma_m_s[kept], self.flags[kept])
+        return _Stock(max(place, self.start), self.velocity_m_s[:, kept], self.sigma_m_s[:, kept], self.flags[:, kept])
 
     def held(self, index: int, count: int, *, start: int) -> _Stock:
         """Return so many copies of one sample, without flags."""
-        return _Stock(
-            start, np.full(count, self.velocity_m_s[index]), np.full(count, self.sigma_m_s[index]), no_flags(count)
+        velocity, sigma = (
+            np.repeat(values[:, [index]], count, axis=1) for values in (self.velocity_m_s, self.sigma_m_s)
         )
+        return _Stock(start, velocity, sigma, no_flags(2, count))
 
 
-def _in_direction(piece: GrooveMotion, direction: Direction, *, start: int) -> _Stock:
-    lateral = direction == "lateral"
-    velocity = piece.lateral_velocity_m_s if lateral else piece.vertical_velocity_m_s
-    sigma = piece.lateral_sigma_m_s if lateral else piece.vertical_sigma_m_s
-    missing = np.isnan(velocity)
-    flags = np.where(missing, piece.flags | np.uint16(Quality.INTERPOLATED), piece.flags).astype(np.uint16)
-    return _Stock(start, np.where(missing, 0.0, velocity), sigma, flags)
-
-
-def _lead_in(first: GrooveMotion, grid: _Grid, direction: Direction) -> _Stock:
-    return _in_direction(first, direction, start=grid.pad).held(0, grid.pad, start=0)
+def _lead_in(first: GrooveMotion, grid: _Grid) -> _Stock:
+    return _Stock.of(first, start=grid.pad).held(0, grid.pad, start=0)
 
 
 def _led_out(stock: _Stock, grid: _Grid) -> _Stock:
     return stock.followed_by(stock.held(-1, grid.reach + 1, start=stock.end))
 
 
-def _sound(stock: _Stock, grid: _Grid, table: FloatArray, *, sounds: tuple[int, int], end: float) -> Audio:
+def _sound(stock: _Stock, grid: _Grid, table: FloatArray, *, sounds: tuple[int, int], end: float) -> GrooveSound:
     """Return the samples of sound from … to; `end` is the last place of the grid, if it is known to have one."""
     places = grid.places(*sounds)
     stretch = grid.stretch(places)
     here = places - stock.start
+    samples = interpolate(stock.velocity_m_s, here, stretch, table, grid.half_width)
+    sigma = _between_neighbours(stock.sigma_m_s, here)
     flags = _joined_flags(stock.flags, here, span=np.maximum(1.0, 0.5 / stretch))
     width = grid.half_width / stretch
     at_edge = (places - width < grid.pad) | (places + width > end)
     flags |= np.where(at_edge, np.uint16(Quality.EDGE), np.uint16(0))
     flags |= np.where(places < grid.pad, np.uint16(Quality.INTERPOLATED), np.uint16(0))
-    return Audio(
-        start_sample=sounds[0],
-        rate_hz=grid.resampler.rate_hz,
-        samples=interpolate(stock.velocity_m_s, here, stretch, table, grid.half_width),
-        sigma=_between_neighbours(stock.sigma_m_s, here),
-        flags=flags,
-        history=(grid.history,),
+    rate_hz = grid.resampler.rate_hz
+    lateral, vertical = (
+        Audio(sounds[0], rate_hz, samples[k], sigma[k], flags[k], (grid.history(direction),))
+        for k, direction in enumerate(("lateral", "vertical"))
     )
+    return GrooveSound(lateral, vertical)
 
 
 def _between_neighbours(values: FloatArray, places: FloatArray) -> FloatArray:
     before = np.floor(places).astype(np.intp)
     share = places - before
-    return np.asarray((1 - share) * values[before] + share * values[before + 1], np.float64)
+    return np.asarray((1 - share) * values[:, before] + share * values[:, before + 1], np.float64)
 
 
 def _joined_flags(flags: FlagArray, places: FloatArray, *, span: FloatArray) -> FlagArray:
     """Return the flags of all samples nearer to each place than `span`, joined."""
     first = np.floor(places - span).astype(np.intp) + 1
     stop = np.ceil(places + span).astype(np.intp)
-    joined = no_flags(places.size)
+    joined = no_flags(len(flags), places.size)
     for step in range(int(np.max(stop - first))):
         k = first + step
-        joined |= np.where(k < stop, flags[np.minimum(k, flags.size - 1)], np.uint16(0))
+        joined |= np.where(k < stop, flags[:, np.minimum(k, flags.shape[1] - 1)], np.uint16(0))
     return joined
 
 
