@@ -16,8 +16,11 @@ of a few pixels and drawn linearly between. The equations of 4 × 4 pixels becom
 **Lamp.** A second picture that is brighter or darker by one factor is made alike: the ratio of the means where both see the
 same, found at the coarse levels. Light that changes from place to place is not allowed for.
 
-**Which way to look.** With one round of looking at the finest level, linear interpolation is as good as it needs to be; large
-motion needs several rounds at coarse levels, where they cost nothing.
+**Common motion.** Grains of one size are not seen in small pictures. So the search begins with the shift of the whole picture
+that phase correlation finds at the third level (C. D. Kuglin and D. C. Hines, 1975), if with it the pictures differ less.
+
+**Looks.** At coarse levels a look costs nothing, and large motion needs several; at the finest level one is enough, but for
+edges of motion, which a second sharpens.
 """
 
 from __future__ import annotations
@@ -28,6 +31,7 @@ from typing import TypeAlias
 import numba
 import numpy as np
 import numpy.typing as npt
+from scipy import fft
 
 from gramoscope.conventions import Float32Array
 from gramoscope.errors import require
@@ -43,8 +47,8 @@ LEAST_PX = 24
 """No level is smaller than this on its shorter side, so far as pictures allow."""
 LEAST_PICTURE_PX = 8
 """Smallest picture that has a flow."""
-LAMP_LEVEL = 2
-"""The finest level at which the lamp is compared."""
+COMMON_LEVEL = 2
+"""The finest level at which the lamp is compared, and where the common motion is looked for."""
 EQUAL = np.ones(4, np.float32)
 
 
@@ -114,14 +118,15 @@ class CoarseToFine:
 
     def _descend(self, first: list[Float32Array], second: list[Float32Array], cells: Field | None) -> Field:
         gain = _ratio(first[-1].mean(), second[-1].mean())
+        if cells is None:
+            cells = _slid(first, second, cell_px=self.cell_px)
         for level in reversed(range(len(first))):
             here, there = first[level], second[level]
             cells = _laid_on(cells, here.shape, cell_px=self.cell_px)
             for _ in range(self.looks + level):
                 cells = self._look(here, there if gain == 1 else there * np.float32(gain), cells)
-            if level >= min(LAMP_LEVEL, len(first) - 1):
+            if level >= min(COMMON_LEVEL, len(first) - 1):
                 gain = _gain(here, there, cells, cell_px=self.cell_px)
-        assert cells is not None
         return cells
 
     def _look(self, first: Float32Array, second: Float32Array, cells: Field) -> Field:
@@ -154,11 +159,50 @@ def _level_count(shape: tuple[int, ...]) -> int:
     return levels
 
 
-def _laid_on(cells: Field | None, shape: tuple[int, ...], *, cell_px: int) -> Field:
+def _slid(first: list[Float32Array], second: list[Float32Array], *, cell_px: int) -> Field:
+    """Cells of the smallest picture that all move with the common motion."""
+    level = min(COMMON_LEVEL, len(first) - 1)
+    down, along = (step / (1 << (len(first) - 1 - level)) for step in common_shift_px(first[level], second[level]))
+    rows, columns = (-(-size // cell_px) for size in first[-1].shape)
+    return np.full((rows, columns), along, np.float32), np.full((rows, columns), down, np.float32)
+
+
+def common_shift_px(first: Float32Array, second: Float32Array) -> tuple[int, int]:
+    """Return by how many whole rows and columns the second picture is shifted, by phase correlation.
+
+    Parameters
+    ----------
+    first, second : float32 arrays, shape (row, column)
+
+    Returns
+    -------
+    down, along : int
+        At most half the picture; 0 where no shift makes the pictures more alike.
+    """
+    a, b = (fft.rfft2(picture - picture.mean()) for picture in (first, second))
+    cross = b * a.conj()
+    # frequencies that hold less than the mean tell little of the shift, and count less
+    weight = np.abs(cross)
+    peak = fft.irfft2(cross / (weight + max(float(weight.mean()), 1e-12)), s=first.shape)
+    place = np.unravel_index(int(peak.argmax()), peak.shape)
+    down, along = (int(p) - size * (2 * int(p) > size) for p, size in zip(place, first.shape, strict=True))
+    if _difference(first, second, down, along) < _difference(first, second, 0, 0):
+        return down, along
+    return 0, 0
+
+
+def _difference(first: Float32Array, second: Float32Array, down: int, along: int) -> float:
+    """Mean square of what differs beside the means, where both pictures are."""
+    (here_y, there_y), (here_x, there_x) = (
+        (slice(max(-d, 0), size - max(d, 0)), slice(max(d, 0), size + min(d, 0)))
+        for d, size in zip((down, along), first.shape, strict=True)
+    )
+    return float((second[there_y, there_x] - first[here_y, here_x]).var())
+
+
+def _laid_on(cells: Field, shape: tuple[int, ...], *, cell_px: int) -> Field:
     """The cells of a level, taken from those of the level above unless they are its own already."""
     rows, columns = -(-shape[0] // cell_px), -(-shape[1] // cell_px)
-    if cells is None:
-        return np.zeros((rows, columns), np.float32), np.zeros((rows, columns), np.float32)
     if cells[0].shape == (rows, columns):
         return cells
     u, v = (_doubled(field, rows, columns) for field in cells)
