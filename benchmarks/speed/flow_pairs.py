@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import ndimage
@@ -34,7 +34,8 @@ class Pair:
 
 def pairs(shape: tuple[int, int] = SHAPE) -> list[Pair]:
     """Return all pairs; without the tree where its frames are absent."""
-    made = [groove(shape), slow_warp(shape), fast_warp(shape), dim_warp(shape), disc_on_ground(shape)]
+    edge = disc_on_ground(shape)
+    made = [groove(shape), slow_warp(shape), slide(shape), fast_warp(shape), dim_warp(shape), edge, at_the_edge(edge)]
     tree = read_tree()
     return made if tree is None else [*made, tree_pair(tree), enlarged_tree(tree)]
 
@@ -56,6 +57,13 @@ def slow_warp(shape: tuple[int, int] = SHAPE) -> Pair:
     return _warped("grain, smooth flow up to 3 px", shape, _smooth_flow(shape, 3.0, seed=1), grain_px=1.5, seed=2)
 
 
+def slide(shape: tuple[int, int] = SHAPE) -> Pair:
+    """The same grain, sliding by 17 px as a whole, with a smooth flow of up to 1 px besides."""
+    flow = _smooth_flow(shape, 1.0, seed=8)
+    slid = Flow(flow.u - np.float32(17.3), flow.v)
+    return _warped("grain, slides by 17.3 px, ± 1 px", shape, slid, grain_px=1.5, seed=9)
+
+
 def fast_warp(shape: tuple[int, int] = SHAPE) -> Pair:
     """Texture of every size under a smooth flow of up to 20 px."""
     return _warped("cloud, smooth flow up to 20 px", shape, _smooth_flow(shape, 20.0, seed=3), grain_px=0.0, seed=4)
@@ -63,8 +71,9 @@ def fast_warp(shape: tuple[int, int] = SHAPE) -> Pair:
 
 def dim_warp(shape: tuple[int, int] = SHAPE) -> Pair:
     """The same with the lamp 5 % dimmer in the second picture."""
-    pair = _warped("the same, lamp 5 % dimmer", shape, _smooth_flow(shape, 20.0, seed=3), grain_px=0.0, seed=4, lamp=0.95)
-    return pair
+    return _warped(
+        "the same, lamp 5 % dimmer", shape, _smooth_flow(shape, 20.0, seed=3), grain_px=0.0, seed=4, lamp=0.95
+    )
 
 
 def disc_on_ground(shape: tuple[int, int] = SHAPE) -> Pair:
@@ -86,6 +95,13 @@ def disc_on_ground(shape: tuple[int, int] = SHAPE) -> Pair:
     return Pair("disc on a ground, edge of motion", *_filmed(first, second, seed=7), flow, _within(flow) & ~hidden)
 
 
+def at_the_edge(pair: Pair, *, reach_px: int = 10) -> Pair:
+    """The same pictures, only the points near the edge."""
+    on = pair.true.u > 0
+    near = ndimage.binary_dilation(on, iterations=reach_px) & ~ndimage.binary_erosion(on, iterations=reach_px)
+    return replace(pair, name=f"the same, within {reach_px} px of the edge", counted=pair.counted & near)
+
+
 def tree_pair(tree: ImageArray) -> Pair:
     """Frames 20 and 21 of the translating tree at their own size, 150 × 150."""
     shape = tree[MIDDLE].shape
@@ -99,7 +115,9 @@ def enlarged_tree(tree: ImageArray, shape: tuple[int, int] = SHAPE) -> Pair:
     scale = (small[0] - 1) / (shape[0] - 1), (small[1] - 1) / (shape[1] - 1)
     rows, columns = np.arange(shape[0]) * scale[0], np.arange(shape[1]) * scale[1]
     grid = np.meshgrid(rows, columns, indexing="ij")
-    frames = [ndimage.map_coordinates(tree[i].astype(np.float64), grid, order=3, mode="nearest") for i in (MIDDLE, MIDDLE + 1)]
+    frames = [
+        ndimage.map_coordinates(tree[i].astype(np.float64), grid, order=3, mode="nearest") for i in (MIDDLE, MIDDLE + 1)
+    ]
     u = np.interp(columns, np.arange(small[1]), TREE_FLOW.u[0]) / scale[1]
     flow = Flow(np.broadcast_to(u.astype(np.float32), shape), np.zeros(shape, np.float32))
     first, second = (np.clip(np.rint(f), 0, 255).astype(np.uint8) for f in frames)
@@ -107,7 +125,7 @@ def enlarged_tree(tree: ImageArray, shape: tuple[int, int] = SHAPE) -> Pair:
 
 
 def _smooth_flow(shape: tuple[int, int], largest_px: float, *, seed: int) -> Flow:
-    """A field of a few long waves, its longest vector so long; the steepest change is about a fifth of it in 100 px."""
+    """A field of a few waves longer than 350 px, its longest vector so long."""
     rng = np.random.default_rng(seed)
     rows, columns = np.mgrid[: shape[0], : shape[1]].astype(np.float64)
     parts = []
@@ -138,9 +156,7 @@ def _drawn(texture: FloatArray, rows: FloatArray, columns: FloatArray) -> FloatA
     return np.asarray(ndimage.map_coordinates(texture, [rows, columns], order=5, mode="grid-wrap"))
 
 
-def _warped(
-    name: str, shape: tuple[int, int], flow: Flow, *, grain_px: float, seed: int, lamp: float = 1.0
-) -> Pair:
+def _warped(name: str, shape: tuple[int, int], flow: Flow, *, grain_px: float, seed: int, lamp: float = 1.0) -> Pair:
     """The second picture is the texture itself, the first looks it up at x + w(x)."""
     texture = _texture(shape, grain_px=grain_px, seed=seed)
     rows, columns = np.mgrid[: shape[0], : shape[1]].astype(np.float64)

@@ -111,7 +111,14 @@ def test_bad_input_is_refused() -> None:
         CoarseToFine().flow(first[:7], second[:7])
     with pytest.raises(ArgumentError, match="same shape"):
         CoarseToFine().flow(first, second, start=Flow(*np.zeros((2, 3, 3), np.float32)))
-    for settings in ({"alpha": 0.0}, {"robust_levels": 0.0}, {"edge_px": -1.0}, {"cell_px": 0}, {"looks": 0}, {"rounds": 0}):
+    for settings in (
+        {"alpha": 0.0},
+        {"robust_levels": 0.0},
+        {"edge_px": -1.0},
+        {"cell_px": 0},
+        {"looks": 0},
+        {"rounds": 0},
+    ):
         with pytest.raises(ArgumentError):
             CoarseToFine(**settings)
 

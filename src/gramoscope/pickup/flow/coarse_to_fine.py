@@ -141,7 +141,9 @@ class CoarseToFine:
 
 
 def _checked(first: Picture, second: Picture, start: Flow | None) -> None:
-    require(first.shape == second.shape, f"pictures of {first.shape} and {second.shape} pixels", "two of the same shape")
+    require(
+        first.shape == second.shape, f"pictures of {first.shape} and {second.shape} pixels", "two of the same shape"
+    )
     require(
         first.ndim == 2 and min(first.shape) >= LEAST_PICTURE_PX,
         f"a picture of shape {first.shape}",
@@ -223,7 +225,8 @@ def _cells_of_flow(flow: Flow, *, cell_px: int, level: int) -> Field:
     shape = [np.diff([*s, size]) for s, size in zip(starts, flow.u.shape, strict=True)]
     area = np.outer(*shape).astype(np.float32)
     u, v = (
-        np.add.reduceat(np.add.reduceat(f, starts[0], axis=0), starts[1], axis=1) * scale / area for f in (flow.u, flow.v)
+        np.add.reduceat(np.add.reduceat(f, starts[0], axis=0), starts[1], axis=1) * scale / area
+        for f in (flow.u, flow.v)
     )
     return u, v
 

@@ -136,7 +136,20 @@ def _sweeps(ix, iy, it, lift, alpha2, beta2, gamma2, iterations, depth, u, v, u_
                 old_u, new_u = (u, u_next) if even else (u_next, u)
                 old_v, new_v = (v, v_next) if even else (v_next, v)
                 _sweep_row(
-                    old_u, old_v, y, ix, iy, it, gain_u, gain_v, alpha2 / a, alpha2 / b, beta2 / a, lift[y], new_u, new_v
+                    old_u,
+                    old_v,
+                    y,
+                    ix,
+                    iy,
+                    it,
+                    gain_u,
+                    gain_v,
+                    alpha2 / a,
+                    alpha2 / b,
+                    beta2 / a,
+                    lift[y],
+                    new_u,
+                    new_v,
                 )
                 _repeat_border(new_u, y)
                 _repeat_border(new_v, y)

@@ -196,7 +196,10 @@ def coarser(equations: FlowEquations) -> FlowEquations:
     tensor = np.empty((3, half_rows, half_columns), np.float32)
     for fine, coarse in zip(equations.tensor, tensor, strict=True):
         _add_up(fine, coarse)
-    along, down = np.empty((half_rows, half_columns + 1), np.float32), np.empty((half_rows + 1, half_columns), np.float32)
+    along, down = (
+        np.empty((half_rows, half_columns + 1), np.float32),
+        np.empty((half_rows + 1, half_columns), np.float32),
+    )
     _coarse_edges(equations.along, equations.down, along, down)
     return FlowEquations(tensor, np.zeros((2, half_rows, half_columns), np.float32), along, down, equations.weights)
 
@@ -262,7 +265,9 @@ def residual_reference(equations: FlowEquations, u: FloatArray, v: FloatArray) -
     def pulled(field: FloatArray, along: float, down: float) -> FloatArray:
         """What the neighbours pull."""
         flux_along, flux_down = along * k_along * np.diff(field, axis=1), down * k_down * np.diff(field, axis=0)
-        return np.diff(np.pad(flux_along, ((0, 0), (1, 1))), axis=1) + np.diff(np.pad(flux_down, ((1, 1), (0, 0))), axis=0)
+        return np.diff(np.pad(flux_along, ((0, 0), (1, 1))), axis=1) + np.diff(
+            np.pad(flux_down, ((1, 1), (0, 0))), axis=0
+        )
 
     ua, ud, va, vd = equations.weights.astype(np.float64)
     f, h = equations.right.astype(np.float64)

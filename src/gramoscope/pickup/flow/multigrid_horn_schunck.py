@@ -1,8 +1,8 @@
 """The flow of Horn and Schunck, with the groove-orientation constraint, solved until nothing changes.
 
-The energy is that of `horn_schunck`; its sweeps stop long before its least value, and what they stop at depends on their
-number. Here it is minimised (`multigrid`). Differences are taken between the four nearest neighbours. Horn and Schunck's average
-counts eight, 1/6 and 1/12 of each; for smooth flow that is the same as 1/3 of each of the four, which is used.
+The energy is that of `horn_schunck`, whose sweeps may stop long before its least value, at a flow that depends on their number.
+Here it is minimised (`multigrid`). Differences are taken between the four nearest neighbours. Horn and Schunck's average counts
+eight, 1/6 and 1/12 of each; for smooth flow that is the same as 1/3 of each of the four, which is used.
 """
 
 from __future__ import annotations
@@ -42,9 +42,7 @@ class MultigridHornSchunck:
         require(self.rounds >= 1, f"{self.rounds} rounds", "at least one")
         require(self.beta >= 0 and self.gamma >= 0, f"beta {self.beta}, gamma {self.gamma}", "zero or more")
 
-    def flow(
-        self, derivatives: Derivatives, *, shear: FloatArray | None = None, start: Flow | None = None
-    ) -> Flow:
+    def flow(self, derivatives: Derivatives, *, shear: FloatArray | None = None, start: Flow | None = None) -> Flow:
         """Return the flow.
 
         Parameters

@@ -93,9 +93,7 @@ def halved(picture: Float32Array) -> Float32Array:
     return out
 
 
-def picture_pyramid(
-    image: npt.NDArray[np.uint8] | npt.NDArray[np.uint16], *, levels: int
-) -> list[Float32Array]:
+def picture_pyramid(image: npt.NDArray[np.uint8] | npt.NDArray[np.uint16], *, levels: int) -> list[Float32Array]:
     """Return a picture at so many sizes, the largest first.
 
     Parameters
