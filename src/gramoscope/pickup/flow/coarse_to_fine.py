@@ -59,8 +59,8 @@ class CoarseToFine:
     Parameters
     ----------
     alpha : float
-        Weight of smoothness, grey levels, positive: how large a difference of brightness in one pixel counts as much as
-        neighbouring pixels whose flow differs by one pixel.
+        Weight of smoothness, grey levels, positive: neighbouring cells whose flow differs by a small part d of a
+        pixel cost as much as one pixel that differs by α d in brightness.
     robust_levels : float
         s, grey levels, positive: a pixel that differs by more than this loses weight.
     edge_px : float
