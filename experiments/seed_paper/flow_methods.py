@@ -11,7 +11,8 @@ from experiments.seed_paper import flow_tree
 from experiments.seed_paper.flow_groove import MIDDLE, Groove
 from experiments.seed_paper.flow_peers import PairFlow, timed
 from experiments.seed_paper.flow_tree import BORDER_ORIGINAL_PX, BORDER_PX, PUBLISHED, TRUE, Score, inside, score
-from gramoscope.pickup.flow.horn_schunck import Flow, FlowMethod, GrooveHornSchunck, HornSchunck
+from gramoscope.pickup.flow.flow_method import FlowMethod
+from gramoscope.pickup.flow.horn_schunck import Flow, GrooveHornSchunck, HornSchunck
 from gramoscope.pickup.flow.registered_flow import common_step_px, registered_flow
 from gramoscope.player.recipe import load_recipe
 from gramoscope.signal_path import ImageArray

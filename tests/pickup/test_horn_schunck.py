@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from gramoscope.errors import ArgumentError
+from gramoscope.pickup.flow import horn_schunck
 from gramoscope.pickup.flow.derivatives import Derivatives
 from gramoscope.pickup.flow.horn_schunck import (
     Flow,
@@ -56,6 +57,25 @@ def test_the_kernel_agrees_with_the_reference(shape: tuple[int, int], beta: floa
     np.testing.assert_allclose(fast.u, slow.u, atol=3e-6)
     np.testing.assert_allclose(fast.v, slow.v, atol=3e-6)
     assert np.abs(slow.u).max() > 0.1
+
+
+@pytest.mark.parametrize("shape", [(1, 7), (3, 5), (37, 61)])
+@pytest.mark.parametrize("iterations", [1, 2, 9, 20])
+def test_sweeps_that_go_together_are_those_that_wait_for_each_other(
+    shape: tuple[int, int], iterations: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    d, shear = _random(shape), np.linspace(-0.1, 0.2, shape[0])
+    found = []
+    for depth in (1, 2, 5, 64):
+        monkeypatch.setattr(horn_schunck, "_depth", lambda width, depth=depth: depth)
+        weights = {"alpha": 0.5, "beta": 0.4, "gamma": 0.3, "shear": shear}
+        found.append(solve_horn_schunck(d, iterations=iterations, **weights))
+    for other in found[1:]:
+        np.testing.assert_array_equal(other.u, found[0].u)
+        np.testing.assert_array_equal(other.v, found[0].v)
+    # not what one sweep fewer gives
+    fewer = solve_horn_schunck_reference(d, iterations=iterations + 1, **weights)
+    assert np.abs(fewer.u - found[0].u).max() > 1e-5
 
 
 def test_one_sweep_from_rest_is_the_normal_flow_of_each_point() -> None:

@@ -20,7 +20,8 @@ from gramoscope.conventions import INNER, MICROMETRES_PER_METRE, FloatArray, Int
 from gramoscope.pickup.cartridge import Line, Sketch, Spread
 from gramoscope.pickup.centreline import Centreline, centroids, discard_damaged_columns, fill_voids
 from gramoscope.pickup.flow.derivatives import Derivatives, group_derivatives, texture_contrast
-from gramoscope.pickup.flow.horn_schunck import Flow, FlowMethod, GrooveHornSchunck
+from gramoscope.pickup.flow.flow_method import FlowMethod
+from gramoscope.pickup.flow.horn_schunck import Flow, GrooveHornSchunck
 from gramoscope.pickup.in_focus import InFocus
 from gramoscope.pickup.registration import Canvas, overlap_textures, registered
 from gramoscope.pickup.search import HoughSearch, Segment, line_rows, line_slopes
@@ -87,7 +88,7 @@ class SeedPaperPickup:
     ----------
     bench : Bench
         What the apparatus is.
-    flow : HornSchunck or GrooveHornSchunck
+    flow : HornSchunck, GrooveHornSchunck or MultigridHornSchunck
         Weights are in units of the sharpest region's gradient.
     smoothing_px : float
         Gaussian before the derivatives.

@@ -19,7 +19,9 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from gramoscope.apparatus.bench import Bench
 from gramoscope.errors import ArgumentError, require
 from gramoscope.pickup.cartridge import Cartridge
-from gramoscope.pickup.flow.horn_schunck import FlowMethod, GrooveHornSchunck, HornSchunck
+from gramoscope.pickup.flow.flow_method import FlowMethod
+from gramoscope.pickup.flow.horn_schunck import GrooveHornSchunck, HornSchunck
+from gramoscope.pickup.flow.multigrid_horn_schunck import MultigridHornSchunck
 from gramoscope.pickup.seed_paper import SeedPaperPickup
 from gramoscope.pickup.texture_likelihood import TextureLikelihood
 from gramoscope.preamp.resample import DEFAULT_PASSBAND
@@ -31,7 +33,11 @@ _CARTRIDGES: dict[str, type[SeedPaperPickup] | type[TextureLikelihood]] = {
     "seed-paper": SeedPaperPickup,
     "texture-likelihood": TextureLikelihood,
 }
-_FLOWS: dict[str, type[FlowMethod]] = {"horn-schunck": HornSchunck, "groove-horn-schunck": GrooveHornSchunck}
+_FLOWS: dict[str, type[FlowMethod]] = {
+    "horn-schunck": HornSchunck,
+    "groove-horn-schunck": GrooveHornSchunck,
+    "multigrid-horn-schunck": MultigridHornSchunck,
+}
 _SMOOTHERS: dict[str, type[KalmanSmoother] | type[PlaceSmoother]] = {"slopes": KalmanSmoother, "places": PlaceSmoother}
 # what a table that names none gets
 _CARTRIDGE, _FLOW, _SMOOTHER = "seed-paper", "groove-horn-schunck", "slopes"

@@ -48,6 +48,10 @@ from gramoscope.pickup.flow.derivatives import Derivatives
 
 AVERAGE = np.array([[1, 2, 1], [2, 0, 2], [1, 2, 1]]) / 12
 """Horn and Schunck's average over the eight neighbours."""
+CACHE_BYTES = 1 << 20
+"""What most processors keep near each core."""
+BYTES_A_POINT = 36
+"""Nine numbers: both flows before and after a sweep, three derivatives, two gains."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,25 +62,28 @@ class Flow:
     v: Float32Array
 
 
-@numba.njit(cache=True, nogil=True)
-def _sweep_row(nw, n, ne, w, e, sw, s, se, share, side, lift, mean):  # type: ignore[no-untyped-def]
-    """Mean of one component over its neighbours, of which `share` counts as the average and `side` as the vertical pair.
+@numba.njit(cache=True, nogil=True, fastmath={"contract"})
+def _sweep_row(u, v, y, ix, iy, it, gain_u, gain_v, share_u, share_v, side, lift, new_u, new_v):  # type: ignore[no-untyped-def]
+    """One row of a sweep: means over the neighbours, `share` of them the average and `side` the vertical pair, put right.
 
-    Neighbours come as rows of their own, so that every index is the loop's and the loop becomes vector instructions.
+    Indices are unsigned: one that may be negative keeps the loop from becoming vector instructions.
     """
-    sixth, twelfth, half = share / np.float32(6), share / np.float32(12), side * np.float32(0.5)
-    up = side * lift
-    for x in range(mean.size):
-        vertical = n[x] + s[x]
-        mean[x] = sixth * (w[x] + e[x] + vertical) + twelfth * (nw[x] + ne[x] + sw[x] + se[x]) + half * vertical + up
-
-
-@numba.njit(cache=True, nogil=True)
-def _correct_row(mean_u, mean_v, ix, iy, it, gain_u, gain_v, u, v):  # type: ignore[no-untyped-def]
-    for x in range(u.size):
-        e = ix[x] * mean_u[x] + iy[x] * mean_v[x] + it[x]
-        u[x] = mean_u[x] - gain_u[x] * e
-        v[x] = mean_v[x] - gain_v[x] * e
+    one, two, half = np.uintp(1), np.uintp(2), np.float32(0.5)
+    along_u, along_v = share_u / np.float32(6), share_v / np.float32(6)
+    corner_u, corner_v = share_u / np.float32(12), share_v / np.float32(12)
+    down_u, up = along_u + side * half, side * lift
+    n = np.uintp(y)
+    h, s = n + one, n + two
+    for x in range(ix.shape[1]):
+        w = np.uintp(x)
+        c, e = w + one, w + two
+        corners_u = (u[n, w] + u[n, e]) + (u[s, w] + u[s, e])
+        corners_v = (v[n, w] + v[n, e]) + (v[s, w] + v[s, e])
+        mean_u = corner_u * corners_u + (down_u * (u[n, c] + u[s, c]) + (along_u * (u[h, w] + u[h, e]) + up))
+        mean_v = corner_v * corners_v + along_v * ((v[n, c] + v[s, c]) + (v[h, w] + v[h, e]))
+        error = ix[n, w] * mean_u + (iy[n, w] * mean_v + it[n, w])
+        new_u[h, c] = mean_u - gain_u[n, w] * error
+        new_v[h, c] = mean_v - gain_v[n, w] * error
 
 
 @numba.njit(cache=True, nogil=True)
@@ -91,49 +98,73 @@ def _gain_row(ix, iy, a, b, gain_u, gain_v):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _repeat_border(field):  # type: ignore[no-untyped-def]
-    field[:, 0] = field[:, 1]
-    field[:, -1] = field[:, -2]
-    field[0] = field[1]
-    field[-1] = field[-2]
+def _repeat_border(field, y):  # type: ignore[no-untyped-def]
+    """Give row y of a picture, which has a border of one pixel in `field`, its neighbours beyond the picture."""
+    row = field[y + 1]
+    row[0], row[-1] = row[1], row[-2]
+    if y == 0:
+        field[0] = row
+    if y == field.shape[0] - 3:
+        field[-1] = row
 
 
 @numba.njit(cache=True, nogil=True)
-def _mean_row(field, y, share, side, lift, mean):  # type: ignore[no-untyped-def]
-    north, here, south = field[y], field[y + 1], field[y + 2]
-    _sweep_row(
-        north[:-2], north[1:-1], north[2:], here[:-2], here[2:], south[:-2], south[1:-1], south[2:],
-        share, side, lift, mean,
-    )  # fmt: skip
-
-
-@numba.njit(cache=True, nogil=True)
-def _sweeps(ix, iy, it, lift, alpha2, beta2, gamma2, iterations, u, v, u_next, v_next):  # type: ignore[no-untyped-def]
-    height, width = ix.shape
-    a, b = alpha2 + beta2, alpha2 + gamma2
-    zero = np.float32(0)
+def _gains(ix, iy, a, b):  # type: ignore[no-untyped-def]
     gain_u, gain_v = np.empty_like(ix), np.empty_like(ix)
-    for y in range(height):
+    for y in range(ix.shape[0]):
         _gain_row(ix[y], iy[y], a, b, gain_u[y], gain_v[y])
-    mean_u, mean_v = np.empty(width, np.float32), np.empty(width, np.float32)
-    for _ in range(iterations):
-        for y in range(height):
-            _mean_row(u, y, alpha2 / a, beta2 / a, lift[y], mean_u)
-            _mean_row(v, y, alpha2 / b, zero, zero, mean_v)
-            _correct_row(
-                mean_u, mean_v, ix[y], iy[y], it[y], gain_u[y], gain_v[y], u_next[y + 1, 1:-1], v_next[y + 1, 1:-1]
-            )
-        _repeat_border(u_next)
-        _repeat_border(v_next)
-        u, u_next = u_next, u
-        v, v_next = v_next, v
-    return u, v
+    return gain_u, gain_v
 
 
-def _lift(shear: FloatArray | None, height: int) -> FloatArray:
-    """½ [g(y−½) − g(y+½)]: what carrying the two vertical neighbours along g adds to their mean.
+@numba.njit(cache=True, nogil=True)
+def _sweeps(ix, iy, it, lift, alpha2, beta2, gamma2, iterations, depth, u, v, u_next, v_next):  # type: ignore[no-untyped-def]
+    """All sweeps, `depth` of them at a time.
 
-    g is taken constant from y−½ to y+½ beyond the border, where the neighbour repeats the border itself.
+    A sweep may follow the one before it at a distance of one row: then all that it reads is done, and what it writes over
+    has been read. So `depth` sweeps go down the picture together, over rows that the cache still holds. Each row is made
+    from the same numbers as if one sweep waited for the other, and comes out the same to the last bit.
+    """
+    height = ix.shape[0]
+    a, b = alpha2 + beta2, alpha2 + gamma2
+    gain_u, gain_v = _gains(ix, iy, a, b)
+    for done in range(0, iterations, depth):
+        together = min(depth, iterations - done)
+        for front in range(height + together - 1):
+            for sweep in range(max(0, front - height + 1), min(together, front + 1)):
+                y = front - sweep
+                even = (done + sweep) % 2 == 0
+                old_u, new_u = (u, u_next) if even else (u_next, u)
+                old_v, new_v = (v, v_next) if even else (v_next, v)
+                _sweep_row(
+                    old_u,
+                    old_v,
+                    y,
+                    ix,
+                    iy,
+                    it,
+                    gain_u,
+                    gain_v,
+                    alpha2 / a,
+                    alpha2 / b,
+                    beta2 / a,
+                    lift[y],
+                    new_u,
+                    new_v,
+                )
+                _repeat_border(new_u, y)
+                _repeat_border(new_v, y)
+    return (u, v) if iterations % 2 == 0 else (u_next, v_next)
+
+
+def _depth(width: int) -> int:
+    """How many sweeps go together: so many that their rows fill `CACHE_BYTES`."""
+    return max(1, CACHE_BYTES // (BYTES_A_POINT * width))
+
+
+def lift_of_shear(shear: FloatArray | None, height: int) -> FloatArray:
+    """Return ½ [g(y−½) − g(y+½)] for every row: what carrying the two vertical neighbours along g adds to their mean.
+
+    Beyond the border the neighbour repeats the border itself, and g is zero there. Without a shear all are zero.
     """
     if shear is None:
         return np.zeros(height)
@@ -172,8 +203,8 @@ def solve_horn_schunck(
     height, width = derivatives.x.shape
     u, v, u_next, v_next = (np.zeros((height + 2, width + 2), np.float32) for _ in range(4))
     u, v = _sweeps(
-        derivatives.x, derivatives.y, derivatives.t, _lift(shear, height).astype(np.float32),
-        np.float32(alpha**2), np.float32(beta**2), np.float32(gamma**2), iterations, u, v, u_next, v_next,
+        derivatives.x, derivatives.y, derivatives.t, lift_of_shear(shear, height).astype(np.float32),
+        np.float32(alpha**2), np.float32(beta**2), np.float32(gamma**2), iterations, _depth(width), u, v, u_next, v_next,
     )  # fmt: skip
     return Flow(u[1:-1, 1:-1], v[1:-1, 1:-1])
 
@@ -189,7 +220,7 @@ def solve_horn_schunck_reference(
 ) -> Flow:
     """Return the same as `solve_horn_schunck`, in NumPy and double precision: slow, and meant to be read."""
     ix, iy, it = (np.asarray(d, np.float64) for d in (derivatives.x, derivatives.y, derivatives.t))
-    lift = _lift(shear, ix.shape[0])[:, None]
+    lift = lift_of_shear(shear, ix.shape[0])[:, None]
     a, b = alpha**2 + beta**2, alpha**2 + gamma**2
     u, v = np.zeros_like(ix), np.zeros_like(ix)
     for _ in range(iterations):
@@ -255,6 +286,3 @@ class GrooveHornSchunck:
         return solve_horn_schunck(
             derivatives, alpha=self.alpha, iterations=self.iterations, beta=self.beta, gamma=self.gamma, shear=shear
         )
-
-
-FlowMethod = HornSchunck | GrooveHornSchunck

@@ -16,7 +16,8 @@ import numpy.typing as npt
 from gramoscope.conventions import Float32Array
 from gramoscope.errors import require
 from gramoscope.pickup.flow.derivatives import Derivatives, group_derivatives, texture_contrast
-from gramoscope.pickup.flow.horn_schunck import Flow, FlowMethod
+from gramoscope.pickup.flow.flow_method import FlowMethod
+from gramoscope.pickup.flow.horn_schunck import Flow
 from gramoscope.pickup.registration import pair_shift_px, register, textured_rows
 from gramoscope.signal_path import ImageArray
 
@@ -56,7 +57,7 @@ def registered_flow(
     ----------
     images : uint8 or uint16 array, shape (frame, row, column)
         Two frames or more, in the order in which the texture moves to smaller columns, as a record's does.
-    method : HornSchunck or GrooveHornSchunck
+    method : FlowMethod
     smoothing_px : float
         Gaussian before the spatial derivatives, 0 for none.
     expected_px : float
