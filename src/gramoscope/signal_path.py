@@ -141,6 +141,26 @@ class WallTrace:
 
 
 @dataclass(frozen=True, eq=False)
+class ErrorSpectrum:
+    """How the claimed error of a piece of motion is spread over the frequencies, where the groove was seen.
+
+    Attributes
+    ----------
+    frequency_hz : float64 array, shape (frequency,)
+        Rising, the same for all pieces of a passage.
+    density : float64 array, shape (2, frequency)
+        (m/s)²/Hz, one-sided, of the lateral and the vertical velocity at nominal speed; NaN for a direction that is not
+        smoothed.
+    samples : int
+        Grid samples that it stands for; 0 where nothing was seen, and then the density is 0.
+    """
+
+    frequency_hz: FloatArray
+    density: FloatArray
+    samples: int
+
+
+@dataclass(frozen=True, eq=False)
 class GrooveMotion:
     """A piece of the groove's motion; pieces follow each other without gap or overlap.
 
@@ -156,6 +176,8 @@ class GrooveMotion:
     vertical_velocity_m_s, vertical_sigma_m_s : float64 arrays, shape (sample,)
         The same towards +z.
     flags : uint16 array, shape (sample,)
+    error_spectrum : ErrorSpectrum or None
+        None where the tonearm cannot tell.
     """
 
     arc_start_m: float
@@ -165,6 +187,7 @@ class GrooveMotion:
     vertical_velocity_m_s: FloatArray
     vertical_sigma_m_s: FloatArray
     flags: FlagArray
+    error_spectrum: ErrorSpectrum | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -64,6 +64,8 @@ class GrooveModel:
         One step of the grid.
     covariance : float64 array, shape (16, 16)
         Of the state before anything was seen.
+    priors : (GroovePrior, GroovePrior)
+        Lateral and vertical.
     agitation : float64 array, shape (bin,)
         How many times q the noise has, from `from_bin` on; once, where it ends.
     """
@@ -74,6 +76,7 @@ class GrooveModel:
     a: FloatArray
     q: FloatArray
     covariance: FloatArray
+    priors: tuple[GroovePrior, GroovePrior]
     agitation: FloatArray = field(default_factory=lambda: np.ones(1))
 
 
@@ -107,7 +110,9 @@ class Beliefs:
             part = slice(i * STATES, (i + 1) * STATES)
             covariance[part, part] = start(self.at_rest[i], sigma[i], place_sigma_m=ANYWHERE_M)
         slowest = min(prior.corner_per_m for prior in self.priors)
-        return GrooveModel(from_bin, slowest, sigma, self.a, sigma[:, None, None] ** 2 * self.q, covariance)
+        return GrooveModel(
+            from_bin, slowest, sigma, self.a, sigma[:, None, None] ** 2 * self.q, covariance, self.priors
+        )
 
 
 def beliefs(priors: tuple[GroovePrior, GroovePrior], step_m: float) -> Beliefs:

@@ -76,6 +76,15 @@ class GroovePrior:
         """Return how much the groove is believed to bend at a level, a change of slope over `BEND_M`."""
         return max(self.share * level, self.floor)
 
+    def slope_density(self, wavenumber_per_m: FloatArray) -> FloatArray:
+        """Return S_u + S_v in metres, two-sided, for var u = 1: its integral over dk/2π from −∞ to ∞ is 1 + `wide_share`²."""
+        k2 = np.asarray(wavenumber_per_m, np.float64) ** 2
+        one, other, width = self.corner_per_m, self.cutoff_per_m, self.width_per_m
+        product, both = one * other, one + other
+        body = 4 * (product * both) ** 3 / (both**2 + product) / ((k2 + one**2) * (k2 + other**2)) ** 2
+        wide = self.wide_share**2 * 16 / 3 * width**5 / (k2 + width**2) ** 3
+        return np.asarray(body + wide)
+
     def steps(self, step_m: float) -> tuple[FloatArray, FloatArray]:
         """Return A and Q for one step of the grid, shape (8, 8) each, the state in metres and var u = 1."""
         drift, noise, _ = self._process(step_m)

@@ -20,8 +20,9 @@ import numpy as np
 from gramoscope.conventions import INNER, OUTER, BoolArray, FloatArray
 from gramoscope.errors import require
 from gramoscope.quality import FlagArray
-from gramoscope.signal_path import GrooveMotion, WallTrace
+from gramoscope.signal_path import ErrorSpectrum, GrooveMotion, WallTrace
 from gramoscope.tonearm.course import Course
+from gramoscope.tonearm.error_spectrum import places_error
 from gramoscope.tonearm.grid_flags import OUTLIER, grid_flags
 from gramoscope.tonearm.groove_model import GrooveModel, PassState, beginning, moves, robustly, which
 from gramoscope.tonearm.place_samples import PlaceSamples, joined, samples_of
@@ -171,13 +172,15 @@ class _PlaceFollower:
         flags = samples.flags.copy()
         flags[measured[~followed.accepted]] |= OUTLIER
         answered = slice(first - state.bin, stop - state.bin)
+        used = fresh.part(followed.accepted)
         motion = self._motion(
             np.arange(first, stop, dtype=np.float64) * self.step_m,
             followed.smoothed.mean[answered] / self.step_m,
             followed.smoothed.sigma[answered] / self.step_m,
             np.stack([model.sigma for model in models])[which(models, np.arange(first, stop))],
-            _both_walls(fresh.part(followed.accepted), first, stop),
+            _both_walls(used, first, stop),
             samples.flagged(flags),
+            places_error(used, models, (first, stop), step_m=self.step_m, course=self.course),
         )
         # outliers stay outliers when the next block looks at them again
         settled = samples.flagged(np.where(samples.bin < stop, flags, samples.flags)).part(samples.bin >= stop - 2)
@@ -191,6 +194,7 @@ class _PlaceFollower:
         prior_sigma: FloatArray,
         both_walls: BoolArray,
         samples: PlaceSamples,
+        spectrum: ErrorSpectrum,
     ) -> GrooveMotion:
         flags: FlagArray = grid_flags(grid, samples.arc_m, samples.flags, reach_m=self.step_m)
         speed = self.course.rotation.speed_at_m_s(grid)[:, None]
@@ -198,7 +202,7 @@ class _PlaceFollower:
         unknown[:, DIRECTIONS.index(self.course.direction)] = False
         velocity, error = (np.where(unknown, np.nan, values * speed) for values in (slope, sigma))
         return GrooveMotion(
-            float(grid[0]), self.step_m, velocity[:, 0], error[:, 0], velocity[:, 1], error[:, 1], flags
+            float(grid[0]), self.step_m, velocity[:, 0], error[:, 0], velocity[:, 1], error[:, 1], flags, spectrum
         )
 
 

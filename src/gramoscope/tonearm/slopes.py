@@ -19,9 +19,10 @@ import numpy as np
 from gramoscope.conventions import BoolArray, FloatArray, IntArray
 from gramoscope.errors import require
 from gramoscope.quality import NOT_MEASURED, FlagArray
-from gramoscope.signal_path import GrooveMotion, WallTrace
+from gramoscope.signal_path import ErrorSpectrum, GrooveMotion, WallTrace
 from gramoscope.tonearm.course import Course
 from gramoscope.tonearm.directions import Observations, observe
+from gramoscope.tonearm.error_spectrum import FREQUENCIES_HZ, slopes_error
 from gramoscope.tonearm.grid_flags import OUTLIER, grid_flags
 from gramoscope.tonearm.kalman import Prior, State, learn_prior, rest, smooth
 
@@ -165,16 +166,34 @@ class _SlopeFollower:
         outlier[fresh] = result.outlier[place[: fresh.size]]
         flags = grid_flags(grid, buffer.arc_m, np.where(outlier, buffer.flags | OUTLIER, buffer.flags), reach_m=step_m)
         mine = place[fresh.size :]
-        return self._motion(grid, step_m, result.mean[mine], result.sigma[mine], flags), result.filtered, outlier
+        spectrum = self._error_spectrum(buffer.part(fresh[~outlier[fresh]]), prior, grid, step_m)
+        motion = self._motion(grid, step_m, result.mean[mine], result.sigma[mine], flags, spectrum)
+        return motion, result.filtered, outlier
 
     def _motion(
-        self, grid: FloatArray, step_m: float, slope: FloatArray, sigma: FloatArray, flags: FlagArray
+        self,
+        grid: FloatArray,
+        step_m: float,
+        slope: FloatArray,
+        sigma: FloatArray,
+        flags: FlagArray,
+        spectrum: ErrorSpectrum,
     ) -> GrooveMotion:
         speed = self.course.rotation.speed_at_m_s(grid)
         velocity, error, nothing = slope * speed, sigma * speed, np.full(grid.size, np.nan)
         if self.course.direction == "lateral":
-            return GrooveMotion(float(grid[0]), step_m, velocity, error, nothing, nothing, flags)
-        return GrooveMotion(float(grid[0]), step_m, nothing, nothing, velocity, error, flags)
+            return GrooveMotion(float(grid[0]), step_m, velocity, error, nothing, nothing, flags, spectrum)
+        return GrooveMotion(float(grid[0]), step_m, nothing, nothing, velocity, error, flags, spectrum)
+
+    def _error_spectrum(self, used: _Buffer, prior: Prior, grid: FloatArray, step_m: float) -> ErrorSpectrum:
+        """What the errors of one answer are like, by the information of all its readings."""
+        here = np.isfinite(used.slope) & (used.arc_m >= grid[0]) & (used.arc_m <= grid[-1])
+        information = float(np.sum(1 / used.variance[here])) / (grid.size * step_m)
+        speed = float(self.course.rotation.speed_at_m_s(float(np.mean(grid))))
+        density, samples = slopes_error(information, prior, speed_m_s=speed, samples=grid.size)
+        unknown = np.full(density.size, np.nan)
+        both = [density, unknown] if self.course.direction == "lateral" else [unknown, density]
+        return ErrorSpectrum(FREQUENCIES_HZ, np.stack(both), samples)
 
     def _observe(self, trace: WallTrace) -> Observations:
         angle = float(np.mean(self.course.wall_angles_rad))

@@ -1,0 +1,130 @@
+"""How the error of a smoothed velocity is spread over the frequencies.
+
+Standard errors say how wrong a sample may be, not at which frequencies. A smoother over a long passage is Wiener's filter
+(N. Wiener, *Extrapolation, Interpolation, and Smoothing of Stationary Time Series*, 1949): where the prior expects the
+density S(k) of slopes and the readings bring the density N(k) of noise, its error has the density
+
+    E(k) = (1/S + 1/N)⁻¹ = S N/(S + N),
+
+and what follows for two directions that are read by two walls is the same with matrices, E = (S⁻¹ + Gᵀ N⁻¹ G)⁻¹. White noise
+of places is noise k² N of slopes: the error rises by 6 dB an octave until the prior has the word, and then falls with it.
+N is one over the information that a metre of readings brings. Loudness and information change along the groove, so E is
+found for each of many short runs and averaged. Its integral over all frequencies is the mean of σ², which tests prove.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gramoscope.conventions import FloatArray
+from gramoscope.signal_path import ErrorSpectrum
+from gramoscope.tonearm.course import Course
+from gramoscope.tonearm.groove_model import GrooveModel, which
+from gramoscope.tonearm.kalman import Prior
+from gramoscope.tonearm.place_samples import PlaceSamples
+
+FREQUENCIES_HZ: FloatArray = np.geomspace(5.0, 160_000.0, 181)
+"""Twelve an octave."""
+RUN_BINS = 32
+"""A tenth of a millimetre: as far as a smoother looks."""
+
+
+def places_error(
+    accepted: PlaceSamples, models: Sequence[GrooveModel], bins: tuple[int, int], *, step_m: float, course: Course
+) -> ErrorSpectrum:
+    """Return the spectrum of the error that a smoother of places claims between two bins.
+
+    Parameters
+    ----------
+    accepted : PlaceSamples
+        What it used.
+    models : sequence of GrooveModel
+        What it believed.
+    bins : (int, int)
+        From … to, the second not included.
+    step_m : float
+        Of the grid.
+    course : Course
+
+    Returns
+    -------
+    ErrorSpectrum
+        Over runs of which something was seen.
+    """
+    starts = np.arange(*bins, RUN_BINS)
+    lengths = np.diff(np.append(starts, bins[1]))
+    information = _information(accepted, bins, lengths * step_m)
+    seen = information.any(axis=1)
+    speed = float(course.rotation.speed_at_m_s(np.mean(bins) * step_m))
+    wavenumber = 2 * np.pi * FREQUENCIES_HZ / speed
+    believed = _believed(models, starts, lengths, wavenumber)
+    error = _wiener(believed[seen], information[seen], wavenumber, course.gains)
+    return _averaged(2 * speed * error, lengths[seen])
+
+
+def slopes_error(information_per_m: float, prior: Prior, *, speed_m_s: float, samples: int) -> tuple[FloatArray, int]:
+    """Return the density of the error that a smoother of slopes claims, (m/s)²/Hz, shape (frequency,).
+
+    Parameters
+    ----------
+    information_per_m : float
+        Sum of 1/variance of the readings of a metre; 0 where there are none.
+    prior : Prior
+        Of Matérn's process of order 3/2, S = 4σ²λ³/(λ² + k²)².
+    speed_m_s : float
+    samples : int
+        Grid samples that this holds for.
+
+    Returns
+    -------
+    density : float64 array, shape (frequency,)
+    samples : int
+        0 where there is no information.
+    """
+    wavenumber = 2 * np.pi * FREQUENCIES_HZ / speed_m_s
+    density = 4 * prior.sigma**2 * prior.rate_per_m**3 / (prior.rate_per_m**2 + wavenumber**2) ** 2
+    error = 2 * speed_m_s / (1 / density + information_per_m)
+    return (error, samples) if information_per_m > 0 else (0 * error, 0)
+
+
+def _information(accepted: PlaceSamples, bins: tuple[int, int], length_m: FloatArray) -> FloatArray:
+    """Of a metre of each wall, shape (run, wall)."""
+    here = (accepted.bin >= bins[0]) & (accepted.bin < bins[1])
+    run = (accepted.bin[here] - bins[0]) // RUN_BINS
+    total = np.zeros((length_m.size, 2))
+    np.add.at(total, (run, accepted.wall[here]), 1 / accepted.variance[here])
+    return np.asarray(total / length_m[:, None])
+
+
+def _believed(
+    models: Sequence[GrooveModel], starts: FloatArray, lengths: FloatArray, wavenumber: FloatArray
+) -> FloatArray:
+    """Densities of the slopes in both directions, shape (run, 2, frequency)."""
+    unit: dict[int, FloatArray] = {}
+    believed = np.empty((starts.size, 2, wavenumber.size))
+    numbers = which(models, (starts + lengths // 2).astype(np.int64))
+    for run, (start, length, number) in enumerate(zip(starts, lengths, numbers, strict=True)):
+        model = models[number]
+        if id(model.priors) not in unit:
+            unit[id(model.priors)] = np.stack([prior.slope_density(wavenumber) for prior in model.priors])
+        restless = model.agitation[max(start - model.from_bin, 0) : max(start - model.from_bin, 0) + length]
+        power = model.sigma**2 * (float(np.mean(restless)) if restless.size else 1.0)
+        believed[run] = power[:, None] * unit[id(model.priors)]
+    return believed
+
+
+def _wiener(believed: FloatArray, information: FloatArray, wavenumber: FloatArray, gains: FloatArray) -> FloatArray:
+    """The diagonal of (S⁻¹ + Gᵀ N⁻¹ G)⁻¹, shape (run, 2, frequency)."""
+    told = information[:, :, None] / wavenumber**2
+    lateral = 1 / believed[:, 0] + told.sum(axis=1)
+    vertical = 1 / believed[:, 1] + np.einsum("rwf,w->rf", told, gains**2)
+    cross = np.einsum("rwf,w->rf", told, gains)
+    return np.asarray(np.stack([vertical, lateral], axis=1) / (lateral * vertical - cross**2)[:, None])
+
+
+def _averaged(density: FloatArray, lengths: FloatArray) -> ErrorSpectrum:
+    samples = int(lengths.sum())
+    mean = np.einsum("rdf,r->df", density, lengths / max(samples, 1))
+    return ErrorSpectrum(FREQUENCIES_HZ, mean, samples)
