@@ -13,10 +13,10 @@ SHOWN_GROUPS = 8
 
 
 def play(
-    capture: Path,
+    capture: Path | None = None,
     /,
     *,
-    out: Path,
+    out: Path | None = None,
     recipe: str = "best",
     rate: int = 96_000,
     characteristic: str | None = None,
@@ -26,6 +26,8 @@ def play(
     originator: str = "",
     reference: str = "",
     description: str = "",
+    again: Path | None = None,
+    force: bool = False,
     workers: Workers = PROCESSORS,
     quiet: bool = False,
     json: bool = False,
@@ -34,16 +36,18 @@ def play(
 
     Writes into DIR, all of them or nothing: `flat.wav` (velocity of the groove in the direction of the cut, no equalisation),
     `walls.wav` (outer and inner wall for themselves), `vertical.wav` (up and down), `equalised.wav`, each Broadcast Wave of
-    24 bit with its SHA-256 beside it; `report.json` and `groove.png`.
+    24 bit with its SHA-256 beside it; `report.html` (how good it is, for people), `report.json` (the same for machines) and
+    `groove.png`.
 
     What the film does not show (a chipped wall, a lost frame) is bridged, flagged and counted in the report.
 
     Parameters
     ----------
     capture
-        Folder with `capture.toml` and frames.
+        Folder with `capture.toml` and frames; may be left out with --again.
     out
-        Folder for the results; made if it does not exist. An earlier transfer in it is replaced.
+        Folder for the results; made if it does not exist. An earlier transfer in it is replaced. With --again it may be left
+        out: a folder beside that of the report, with `-again` after its name.
     recipe
         How to read: a name that ships with us, or a TOML file. `gramoscope recipe` shows them.
     rate
@@ -65,6 +69,11 @@ def play(
     description
         What the files shall say first of themselves, 256 characters at the most; title, performer, label, matrix, side and
         date of the capture when left out.
+    again
+        A `report.json`: repeat its transfer bit for bit, with its recipe, settings and words, from the same capture. What
+        differs is told: other versions, other sums.
+    force
+        With --again: go on although the capture is not the one that was played.
     workers
         Stretches read at the same time; one for each processor when left out. The result does not depend on it.
     quiet
@@ -72,12 +81,21 @@ def play(
     json
         Print the report as JSON.
     """
+    if again is not None:
+        from gramoscope.cli.play_again import play_again
+
+        return play_again(play, locals())
     from gramoscope.apparatus.capture import open_capture
+    from gramoscope.errors import ArgumentError
     from gramoscope.player.catalogue import Catalogue
     from gramoscope.player.play import Settings
     from gramoscope.player.play import play as play_capture
     from gramoscope.player.recipe import load_recipe
 
+    if capture is None or out is None:
+        raise ArgumentError(
+            f"{'CAPTURE' if capture is None else '--out'} requires an argument", "a capture and a folder"
+        )
     terminal = Terminal(quiet, json)
     opened = open_capture(capture)
     name = characteristic or opened.bench.disc.characteristic or "riaa"
@@ -114,7 +132,7 @@ def tell(terminal: Terminal, report: Mapping[str, Any], out: Path) -> None:
 
 def _names(report: Mapping[str, Any]) -> list[str]:
     sounds = [[name, *([file["flac"]["name"]] if "flac" in file else [])] for name, file in report["files"].items()]
-    return [*(name for names in sounds for name in names), "groove.png", "report.json"]
+    return [*(name for names in sounds for name in names), "groove.png", "report.html", "report.json"]
 
 
 def _groups(report: Mapping[str, Any]) -> str:

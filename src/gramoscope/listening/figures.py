@@ -126,6 +126,25 @@ def groove_figure(
     return figure
 
 
+def frame_figure(
+    image: ImageArray,
+    *,
+    white_level: int,
+    pixel_pitch_m: float,
+    stripes: Sequence[tuple[str, FloatArray, FloatArray, BoolArray]],
+) -> Figure:
+    """Draw one frame with the stripes found in it, small, for a page; parameters as in `groove_figure`."""
+    require(image.ndim == 2, f"an image of shape {image.shape}", "shape (row, column)")
+    width_in = 4.6
+    figure = ink.blank_figure(width_in, width_in * image.shape[0] / image.shape[1] + 0.5)
+    axes = figure.subplots()
+    _draw_frame(axes, image, white_level=white_level, pixel_pitch_m=pixel_pitch_m)
+    for line, colour in zip(stripes, _cycled(len(stripes)), strict=True):
+        _draw_stripe(axes, StripeLine(*line), colour=colour, height_px=image.shape[0], pixel_pitch_m=pixel_pitch_m)
+    ink.dress(axes, x="along the groove (µm)", y="across (µm)", grid=False)
+    return figure
+
+
 def _cycled(count: int) -> list[str]:
     return [STRIPE_COLOURS[number % len(STRIPE_COLOURS)] for number in range(count)]
 

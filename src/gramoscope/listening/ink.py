@@ -7,9 +7,11 @@ axes it concerns.
 from __future__ import annotations
 
 import os
+from io import BytesIO
 from pathlib import Path
 from typing import Literal
 
+from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -92,6 +94,21 @@ def readable_time(time_s: FloatArray) -> tuple[FloatArray, str]:
     return (time_s, "s") if len(time_s) and time_s[-1] - time_s[0] > 1 else (1e3 * time_s, "ms")
 
 
+def png_of(figure: Figure) -> bytes:
+    """Return a figure as PNG; equal figures give equal bytes."""
+    into = BytesIO()
+    figure.savefig(into, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
+    return into.getvalue()
+
+
+def svg_of(figure: Figure) -> bytes:
+    """Return a figure as SVG, its letters as letters; equal figures give equal bytes."""
+    into = BytesIO()
+    with rc_context({"svg.fonttype": "none", "svg.hashsalt": "gramoscope"}):
+        figure.savefig(into, format="svg", metadata={"Date": None, "Creator": None})
+    return into.getvalue()
+
+
 def save_png(figure: Figure, path: str | os.PathLike[str]) -> None:
     """Write a figure as a PNG file that appears whole or not at all; equal figures give equal bytes.
 
@@ -107,4 +124,4 @@ def save_png(figure: Figure, path: str | os.PathLike[str]) -> None:
         If the file cannot be written.
     """
     with written_whole(Path(path)) as temporary:
-        figure.savefig(temporary, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
+        temporary.write_bytes(png_of(figure))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,10 @@ from typing import Any
 import numpy as np
 
 from gramoscope.listening.whole_file import written_whole
+
+# a line break stands between values only: texts hold it as \n
+_LIST_OF_NUMBERS = re.compile(r'\[\n[^"\[\]{}]*\]')
+_BREAK = re.compile(r"\s*\n\s*")
 
 
 def plain(value: Any) -> Any:
@@ -48,8 +53,11 @@ def plain(value: Any) -> Any:
 
 
 def json_text(report: Mapping[str, Any]) -> str:
-    """Return a report as indented JSON in UTF-8, keys in the order given; values as in `plain`."""
-    return json.dumps(plain(report), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    """Return a report as indented JSON in UTF-8, keys in the order given, lists of numbers in a line; values as in `plain`."""
+    text = json.dumps(plain(report), indent=2, ensure_ascii=False, allow_nan=False)
+    return (
+        _LIST_OF_NUMBERS.sub(lambda found: _BREAK.sub(" ", found[0]).replace("[ ", "[").replace(" ]", "]"), text) + "\n"
+    )
 
 
 def write_json(path: str | os.PathLike[str], report: Mapping[str, Any]) -> None:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from gramoscope.conventions import BoolArray, FloatArray
+from gramoscope.player.quality_meter import QualityMeter
 from gramoscope.quality import NOT_MEASURED, Quality, count
-from gramoscope.signal_path import Audio, WallTrace
+from gramoscope.signal_path import Audio, GrooveMotion, WallTrace
 from gramoscope.tonearm.splice import Match
 
 MOST_PROBLEMS = 200
@@ -54,8 +56,9 @@ def _extremes(runs: FloatArray) -> FloatArray:
 
 @dataclass
 class Monitor:
-    """Counts and sums over a transfer."""
+    """Counts and sums over a transfer; `quality` gathers the statement of quality beside them."""
 
+    quality: QualityMeter | None = None
     groups: int = 0
     groups_lost: list[int] = field(default_factory=list)
     frames_lost: int = 0
@@ -82,6 +85,8 @@ class Monitor:
 
     def picked_up(self, trace: WallTrace, frames_lost: int) -> None:
         """Take note of a stretch that the pickup has read."""
+        if self.quality is not None:
+            self.quality.picked_up(trace)
         self.groups += 1
         self.frames_lost += frames_lost
         read = np.isfinite(trace.offset_m) & ((trace.flags & np.uint16(NOT_MEASURED)) == 0)
@@ -114,8 +119,14 @@ class Monitor:
             self.matches += 1
             self.match_square_m2 += match.error_m**2
 
+    def followed(self, pieces: Iterator[GrooveMotion]) -> Iterator[GrooveMotion]:
+        """Take note of the tonearm's pieces as they pass by."""
+        return pieces if self.quality is None else self.quality.followed(pieces)
+
     def heard(self, piece: Audio) -> None:
         """Take note of a piece of the flat transfer."""
+        if self.quality is not None:
+            self.quality.heard(piece)
         measured = (piece.flags & np.uint16(NOT_MEASURED)) == 0
         self.samples += piece.samples.size
         self.interpolated += int(piece.samples.size - np.count_nonzero(measured))
@@ -152,7 +163,11 @@ class Monitor:
             "groups": {"read": self.groups - len(self.groups_lost), "lost": len(self.groups_lost)},
             "lost_groups": self.groups_lost[:MOST_PROBLEMS],
             "frames_lost": self.frames_lost,
-            "share": {"measured": self.measured_share, "interpolated": 1 - self.measured_share},
+            "share": {
+                "measured": self.measured_share,
+                "interpolated": 1 - self.measured_share,
+                **(self.quality.shares() if self.quality is not None else {}),
+            },
             "flagged_samples": {name: self.flags.get(name, 0) for name in _FLAG_NAMES},
             "flagged_pickup_samples": {name: self.pickup_flags.get(name, 0) for name in _FLAG_NAMES},
             "noise_estimate": {"sigma_rms_cm_s": 100 * self.noise_m_s, "signal_to_noise_db": self.snr_db},
@@ -178,6 +193,7 @@ class Monitor:
                     1e6 * float(np.sqrt(self.match_square_m2 / self.matches)) if self.matches else float("nan")
                 ),
             },
+            "quality": self.quality.as_dict() if self.quality is not None else {},
             "problems": self.problems,
             "problems_not_listed": self.problems_count - len(self.problems),
         }

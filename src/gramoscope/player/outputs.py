@@ -20,7 +20,7 @@ from gramoscope.player.track_file import TrackFile
 from gramoscope.player.tracks import Track
 from gramoscope.signal_path import Audio
 
-REPORT, PICTURE = "report.json", "groove.png"
+REPORT, PAGE, PICTURE = "report.json", "report.html", "groove.png"
 Piece = TypeVar("Piece")
 
 
@@ -109,18 +109,22 @@ class Outputs:
             file.complete()
         return {track.name: file.as_dict() for track, file in self._files.items()}
 
-    def finish(self, report: Mapping[str, Any], picture: Figure) -> None:
+    def finish(self, report: Mapping[str, Any], picture: Figure, page: str) -> None:
         """Complete everything under temporary names, then put all of it in place."""
         text = json_text(report)
         self.complete()
-        report_whole, picture_whole = (written_whole(self.folder / name) for name in (REPORT, PICTURE))
-        with contextlib.ExitStack() as holding, report_whole as report_part, picture_whole as picture_part:
+        with contextlib.ExitStack() as holding, contextlib.ExitStack() as parts:
+            report_part, page_part, picture_part = (
+                parts.enter_context(written_whole(self.folder / name)) for name in (REPORT, PAGE, PICTURE)
+            )
             report_part.write_text(text, encoding="utf-8")
+            page_part.write_text(page, encoding="utf-8")
             save_png(picture, picture_part)
             holding.enter_context(ctrl_c_waits())
             # nothing large is left to do: from here on an old transfer makes way. Whoever sees a report sees a whole
             # transfer, so the old one goes first and the new one comes last, when the block ends
-            (self.folder / REPORT).unlink(missing_ok=True)
+            for name in (REPORT, PAGE):
+                (self.folder / name).unlink(missing_ok=True)
             for file in self._files.values():
                 file.retire_older()
             for file in self._files.values():

@@ -2,15 +2,44 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from matplotlib.figure import Figure
 
 from gramoscope.apparatus.capture import Capture
-from gramoscope.listening.figures import groove_figure
+from gramoscope.conventions import BoolArray, FloatArray
+from gramoscope.listening.figures import frame_figure, groove_figure
 from gramoscope.pickup.cartridge import Pickup, Sketch
 from gramoscope.player.monitor import Monitor
+from gramoscope.player.worst_groups import Doubtful
 
 TRIED_GROUPS = 8
+WORST_PLACES = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A group that is worth a look, and its picture."""
+
+    group: Doubtful
+    figure: Figure
+
+
+def worst_places(capture: Capture, pickup: Pickup, monitor: Monitor) -> list[Place]:
+    """Draw the worst groups of a transfer of which at least one frame is left, the worst first."""
+    sensor, places = capture.bench.sensor, list[Place]()
+    for group in monitor.quality.worst.worst_first() if monitor.quality is not None else ():
+        sketch = pickup.sketch(capture.group(group.number)) if len(places) < WORST_PLACES else None
+        if sketch is not None:
+            figure = frame_figure(
+                sketch.image,
+                white_level=sensor.white_level,
+                pixel_pitch_m=sensor.pixel_pitch_m,
+                stripes=_stripes(sketch),
+            )
+            places.append(Place(group, figure))
+    return places
 
 
 def groove_picture(capture: Capture, pickup: Pickup, monitor: Monitor, *, rate_hz: float, recipe_name: str) -> Figure:
@@ -19,16 +48,20 @@ def groove_picture(capture: Capture, pickup: Pickup, monitor: Monitor, *, rate_h
     bench = capture.bench
     if sketch is None:
         sketch = Sketch(np.zeros((bench.sensor.height_px, bench.sensor.width_px), np.uint8), ())
-    columns = np.arange(sketch.image.shape[1], dtype=np.float64)
     return groove_figure(
         sketch.image,
         white_level=bench.sensor.white_level,
         pixel_pitch_m=bench.sensor.pixel_pitch_m,
-        stripes=[(line.name, columns, line.row, line.measured) for line in sketch.lines],
+        stripes=_stripes(sketch),
         glass_edge_row=bench.glass_edge_row if bench.cover_glass else None,
         waveform=monitor.overview.waveform(rate_hz),
         title=f"{capture.folder.name}: group {number} of {capture.group_count}, read by “{recipe_name}”",
     )
+
+
+def _stripes(sketch: Sketch) -> list[tuple[str, FloatArray, FloatArray, BoolArray]]:
+    columns = np.arange(sketch.image.shape[1], dtype=np.float64)
+    return [(line.name, columns, line.row, line.measured) for line in sketch.lines]
 
 
 def _telling_group(capture: Capture, pickup: Pickup) -> tuple[int, Sketch | None]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -25,8 +25,10 @@ from gramoscope.pickup.cartridge import Pickup
 from gramoscope.player.catalogue import Catalogue, metadata_of
 from gramoscope.player.monitor import OVERVIEW_POINTS, Monitor
 from gramoscope.player.outputs import Outputs
-from gramoscope.player.picture import groove_picture
+from gramoscope.player.picture import groove_picture, worst_places
 from gramoscope.player.provenance import InputHashes, hash_group
+from gramoscope.player.quality_meter import QualityMeter
+from gramoscope.player.quality_page import quality_page
 from gramoscope.player.recipe import Recipe
 from gramoscope.player.report import transfer_report
 from gramoscope.player.tracks import EQUALISED, FLAT, TRACKS, VERTICAL, WALLS, alone, vertical
@@ -92,7 +94,13 @@ class Settings:
 
 
 def play(
-    capture: Capture, recipe: Recipe, folder: Path, settings: Settings, *, progress: Progress | None = None
+    capture: Capture,
+    recipe: Recipe,
+    folder: Path,
+    settings: Settings,
+    *,
+    progress: Progress | None = None,
+    judge: Callable[[Mapping[str, Any]], Mapping[str, Any]] | None = None,
 ) -> dict[str, Any]:
     """Turn a capture into sound files, a report and a picture.
 
@@ -101,10 +109,12 @@ def play(
     capture : Capture
     recipe : Recipe
     folder : Path
-        Where the tracks (`player.tracks`), `report.json` and `groove.png` go.
+        Where the tracks (`player.tracks`), `report.json`, `report.html` and `groove.png` go.
     settings : Settings
     progress : callable, optional
         Told how much is done, of how much, and of what ("Learning", "Playing").
+    judge : callable, optional
+        Given the report before anything is put in place; returns what to add to it, or raises (`player.again`).
 
     Returns
     -------
@@ -123,23 +133,23 @@ def play(
     equaliser = Equaliser(characteristic(settings.characteristic_name))
     tonearm = Tonearm(bench.rotation, direction, bench.disc.wall_angle_rad, bench.passage_length_m, recipe.smoother)
     resampler = Resampler(bench.rotation, settings.rate_hz, recipe.passband)
-    hashes, monitor = InputHashes(), _monitor(capture, settings.rate_hz)
+    hashes, monitor = InputHashes(), _monitor(capture, tonearm, resampler)
 
     with _outputs(capture, recipe, folder, settings) as files:
         pickup = learned(capture, recipe, settings.workers, progress=progress)
         traces = _picked_up(capture, pickup, settings.workers, hashes, monitor, progress)
-        motion = tonearm.follow(_spliced(traces, recipe, monitor))
+        motion = monitor.followed(tonearm.follow(_spliced(traces, recipe, monitor)))
         sound = files.kept(WALLS, resampler.resample(motion), WallSplitter(direction, pickup.walls).split)
         sound = files.kept(VERTICAL, sound, vertical)
         flat = files.kept(FLAT, _heard((in_direction(piece, direction) for piece in sound), monitor), alone)
         for _ in files.kept(EQUALISED, equaliser.equalise(flat), alone):
             pass
         _require_sound(monitor)
-        report = transfer_report(
-            capture, recipe, pickup, settings, hashes, monitor, files.complete(), time.perf_counter() - started
-        )
+        elapsed_s, sounds = time.perf_counter() - started, files.complete()
+        report = transfer_report(capture, recipe, pickup, settings, hashes, monitor, sounds, folder, elapsed_s)
+        report |= judge(report) if judge is not None else {}
         picture = groove_picture(capture, pickup, monitor, rate_hz=settings.rate_hz, recipe_name=recipe.name)
-        files.finish(report, picture)
+        files.finish(report, picture, quality_page(report, worst_places(capture, pickup, monitor)))
     return report
 
 
@@ -199,9 +209,11 @@ def _outputs(capture: Capture, recipe: Recipe, folder: Path, settings: Settings)
     return Outputs(folder, tracks, rate_hz=settings.rate_hz, full_scale_m_s=settings.full_scale_m_s, flac=settings.flac)
 
 
-def _monitor(capture: Capture, rate_hz: float) -> Monitor:
-    samples = float(capture.bench.rotation.time_of_arc_s(capture.bench.passage_length_m)) * rate_hz
-    monitor = Monitor()
+def _monitor(capture: Capture, tonearm: Tonearm, resampler: Resampler) -> Monitor:
+    bench, rate_hz = capture.bench, resampler.rate_hz
+    samples = float(bench.rotation.time_of_arc_s(bench.passage_length_m)) * rate_hz
+    quality = QualityMeter(tonearm, bench.disc.cut, rate_hz=rate_hz, passband=resampler.passband, samples=samples)
+    monitor = Monitor(quality)
     monitor.overview.samples_per_point = max(1, int(np.ceil(samples / OVERVIEW_POINTS)))
     return monitor
 

@@ -6,16 +6,22 @@ import hashlib
 import json
 import platform
 import sys
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from importlib.metadata import version
-from pathlib import Path
-from typing import Any
+from os.path import relpath
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING, Any
 
 from gramoscope.apparatus.capture import Capture
 from gramoscope.apparatus.fingerprint import sha256_of_file
 from gramoscope.player.recipe import Recipe, table_of_recipe
 
-_LIBRARIES = ("gramoscope", "numpy", "scipy", "numba", "soxr", "soundfile", "tifffile", "zarr", "pillow")
+if TYPE_CHECKING:
+    from gramoscope.player.play import Settings
+
+_LIBRARIES = ("gramoscope", "numpy", "scipy", "numba", "llvmlite", "soxr", "soundfile", "tifffile", "zarr", "pillow")
+_NO_INFLUENCE = ("workers", "catalogue")
+"""Settings that stand elsewhere in the report, or that the result does not depend on."""
 
 
 def versions() -> dict[str, str]:
@@ -31,6 +37,19 @@ def bench_of(capture: Capture) -> dict[str, Any]:
     """Return the apparatus in plain numbers, SI units."""
     bench = capture.bench
     return {**asdict(bench), "focus_through_glass_m": bench.focus_through_glass_m, "stripe_rows": bench.stripe_rows()}
+
+
+def settings_of(settings: Settings) -> dict[str, Any]:
+    """Return what the listener chose, beside the recipe and the catalogue, as far as the result depends on it."""
+    return {one.name: getattr(settings, one.name) for one in fields(settings) if one.name not in _NO_INFLUENCE}
+
+
+def from_folder(path: Path, folder: Path) -> str | None:
+    """Return the way from a folder to a path, with slashes; None where there is none (another drive)."""
+    try:
+        return PurePath(relpath(path.resolve(), folder.resolve())).as_posix()
+    except ValueError:
+        return None
 
 
 def recipe_of(recipe: Recipe) -> dict[str, Any]:

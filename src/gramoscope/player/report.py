@@ -4,14 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gramoscope.apparatus.capture import Capture
 from gramoscope.disc.formats import direction_of_cut
 from gramoscope.pickup.cartridge import Pickup
+from gramoscope.player.calibration_check import calibration_check
 from gramoscope.player.monitor import Monitor
-from gramoscope.player.provenance import InputHashes, bench_of, command_line, recipe_of, versions
+from gramoscope.player.provenance import (
+    InputHashes,
+    bench_of,
+    command_line,
+    from_folder,
+    recipe_of,
+    settings_of,
+    versions,
+)
 from gramoscope.player.recipe import Recipe
+from gramoscope.player.response import response_of
 from gramoscope.player.tracks import EQUALISED
 from gramoscope.quality import Quality, describe
 
@@ -29,16 +40,20 @@ def transfer_report(
     hashes: InputHashes,
     monitor: Monitor,
     files: Mapping[str, Mapping[str, Any]],
+    folder: Path,
     elapsed_s: float,
 ) -> dict[str, Any]:
-    """Return the report of a transfer as plain numbers, texts, lists and dicts."""
-    seconds = monitor.samples / settings.rate_hz
+    """Return the report of a transfer into a folder as numbers, texts, arrays, lists and dicts; docs/reference/report.md."""
+    seconds, seen = monitor.samples / settings.rate_hz, monitor.as_dict()
     return {
         "format": REPORT_FORMAT,
-        "made": settings.catalogue.made.isoformat(timespec="seconds"),
+        "made": settings.catalogue.made.isoformat(),
         "catalogue": {name: text for name, text in asdict(settings.catalogue).items() if name != "made"},
         "command": command_line(),
+        "settings": settings_of(settings),
         "capture": str(capture.folder),
+        "capture_name": capture.folder.resolve().name,
+        "capture_from_here": from_folder(capture.folder, folder),
         "layout": capture.layout,
         "seconds": seconds,
         "rate_hz": settings.rate_hz,
@@ -46,7 +61,10 @@ def transfer_report(
         "walls_read": list(pickup.walls),
         "remarks": [*_remarks(capture, pickup.walls), *_clipped(files)],
         "calibration": dict(pickup.calibration),
-        **monitor.as_dict(),
+        "calibration_check": calibration_check(capture.bench, pickup.calibration, seen),
+        **seen,
+        "speed": None,
+        "response": response_of(settings.characteristic_name, rate_hz=settings.rate_hz),
         "files": {
             **files,
             EQUALISED.name: {**files[EQUALISED.name], "characteristic": settings.characteristic_name},

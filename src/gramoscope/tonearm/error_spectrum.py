@@ -18,7 +18,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gramoscope.conventions import FloatArray
+from gramoscope.conventions import FloatArray, IntArray
 from gramoscope.signal_path import ErrorSpectrum
 from gramoscope.tonearm.course import Course
 from gramoscope.tonearm.groove_model import GrooveModel, which
@@ -98,9 +98,7 @@ def _information(accepted: PlaceSamples, bins: tuple[int, int], length_m: FloatA
     return np.asarray(total / length_m[:, None])
 
 
-def _believed(
-    models: Sequence[GrooveModel], starts: FloatArray, lengths: FloatArray, wavenumber: FloatArray
-) -> FloatArray:
+def _believed(models: Sequence[GrooveModel], starts: IntArray, lengths: IntArray, wavenumber: FloatArray) -> FloatArray:
     """Densities of the slopes in both directions, shape (run, 2, frequency)."""
     unit: dict[int, FloatArray] = {}
     believed = np.empty((starts.size, 2, wavenumber.size))
@@ -124,7 +122,7 @@ def _wiener(believed: FloatArray, information: FloatArray, wavenumber: FloatArra
     return np.asarray(np.stack([vertical, lateral], axis=1) / (lateral * vertical - cross**2)[:, None])
 
 
-def _averaged(density: FloatArray, lengths: FloatArray) -> ErrorSpectrum:
+def _averaged(density: FloatArray, lengths: IntArray) -> ErrorSpectrum:
     samples = int(lengths.sum())
     mean = np.einsum("rdf,r->df", density, lengths / max(samples, 1))
     return ErrorSpectrum(FREQUENCIES_HZ, mean, samples)
