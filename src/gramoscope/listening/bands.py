@@ -14,6 +14,8 @@ from gramoscope.conventions import FloatArray, IntArray
 from gramoscope.errors import require
 
 LOWEST_HZ = 20.0
+NOMINAL: FloatArray = np.array([1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0])
+"""How the ten thirds of a decade are called."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +25,7 @@ class Bands:
     Attributes
     ----------
     centre_hz : float64 array, shape (band,)
+        By their nominal names: 1250, not 1258.9.
     edge_hz : float64 array, shape (band + 1,)
     """
 
@@ -45,7 +48,8 @@ def _bands(highest_hz: float, numbers: IntArray, thirds: int) -> Bands:
     inside = centre * 10 ** (thirds / 20) <= highest_hz
     require(bool(inside.any()), f"bands up to {highest_hz:g} Hz", "a higher frequency")
     centre = centre[inside]
-    return Bands(centre, np.append(centre * 10 ** (-thirds / 20), centre[-1] * 10 ** (thirds / 20)))
+    names = NOMINAL[numbers[inside] % 10] * 10.0 ** (3 + numbers[inside] // 10)
+    return Bands(names, np.append(centre * 10 ** (-thirds / 20), centre[-1] * 10 ** (thirds / 20)))
 
 
 def band_power(frequency_hz: FloatArray, density: FloatArray, bands: Bands) -> FloatArray:

@@ -10,6 +10,8 @@ from importlib import resources
 from gramoscope.errors import require
 
 STYLE_FILE = "page.css"
+WIDEST, LONGEST_NUMBER = 4, 16
+"""Columns of numbers that a narrow screen has room for; letters of a number with its unit."""
 
 
 def paragraph(text: str) -> str:
@@ -36,18 +38,40 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], *, caption: str = 
     ----------
     head : sequence of str
     rows : iterable of sequences of str
-        As many as in the head.
+        As many as in the head. A column that holds words is set to the left, one of numbers to the right. On a narrow
+        screen the rows of a table of words, or of many columns, stand as a list.
     caption : str
     """
-    columns = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head)
-    body = "".join(_row(row, len(head)) for row in rows)
-    return f'<div class="wide"><table>{_caption(caption)}<thead><tr>{columns}</tr></thead><tbody>{body}</tbody></table></div>'
+    rows = list(rows)
+    for row in rows:
+        require(len(row) == len(head), f"a row of {len(row)} cells", f"{len(head)}")
+    words = [any(_is_words(row[i]) for row in rows) for i in range(len(head))]
+    stacked = ' class="stacked"' if any(words[1:]) or len(head) > WIDEST else ""
+    columns = "".join(
+        f'<th scope="col"{_kind(wordy)}>{escape(cell)}</th>' for cell, wordy in zip(head, words, strict=True)
+    )
+    body = "".join(_row(row, head, words) for row in rows)
+    return (
+        f'<div class="wide"><table{stacked}>{_caption(caption)}<thead><tr>{columns}</tr></thead>'
+        f"<tbody>{body}</tbody></table></div>"
+    )
 
 
-def _row(cells: Sequence[str], columns: int) -> str:
-    require(len(cells) == columns, f"a row of {len(cells)} cells", f"{columns}")
-    first, *others = (escape(cell) for cell in cells)
-    return f'<tr><th scope="row">{first}</th>{"".join(f"<td>{cell}</td>" for cell in others)}</tr>'
+def _row(cells: Sequence[str], head: Sequence[str], words: Sequence[bool]) -> str:
+    others = "".join(
+        f'<td data-label="{escape(name, quote=True)}"{_kind(wordy)}>{escape(cell)}</td>'
+        for cell, name, wordy in zip(cells[1:], head[1:], words[1:], strict=True)
+    )
+    return f'<tr><th scope="row">{escape(cells[0])}</th>{others}</tr>'
+
+
+def _kind(wordy: bool) -> str:
+    return ' class="words"' if wordy else ""
+
+
+def _is_words(cell: str) -> bool:
+    """Whether a cell is more than a number with its unit."""
+    return len(cell) > LONGEST_NUMBER or cell[:1].isalpha()
 
 
 def _caption(text: str) -> str:

@@ -36,6 +36,7 @@ def band_figure(bands: Mapping[str, Any]) -> Figure:
     axes.fill_between(centre, error, sound, where=sound > error, color=ink.SKY, alpha=0.25, lw=0)
     axes.loglog(centre, sound, color=ink.BLUE, linewidth=1.6, label="sound")
     axes.loglog(centre, error, color=ink.VERMILLION, linewidth=1.6, linestyle=(0, (4, 2)), label="claimed error")
+    _whole_decades(axes)
     _frequencies(axes, "rms in a third of an octave (cm/s)")
     ink.legend_above(axes, columns=2)
     return figure
@@ -46,6 +47,7 @@ def density_figure(frequency_hz: FloatArray, density_m2_s2_per_hz: FloatArray, *
     figure, axes = _blank()
     shown = (frequency_hz >= 20.0) & (frequency_hz <= highest_hz)
     axes.loglog(frequency_hz[shown], 100 * np.sqrt(density_m2_s2_per_hz[shown]), color=ink.VERMILLION, linewidth=1.6)
+    _whole_decades(axes)
     _frequencies(axes, "claimed error (cm/s per √Hz)")
     return figure
 
@@ -83,6 +85,7 @@ def share_figure(along_time: Mapping[str, Any]) -> Figure:
         along_time["sigma_rms_cm_s"], edge, baseline=None, color=ink.VERMILLION, linewidth=1.3, label="claimed error"
     )
     below.set_yscale("log")
+    _whole_decades(below)
     for axes, x, y, columns in ((above, "", "share (%)", 3), (below, f"time ({unit})", "rms (cm/s)", 2)):
         axes.margins(x=0.0)
         ink.dress(axes, x=x, y=y)
@@ -93,6 +96,13 @@ def share_figure(along_time: Mapping[str, Any]) -> Figure:
 def _blank() -> tuple[Figure, Axes]:
     figure = ink.blank_figure(WIDTH_IN, HEIGHT_IN)
     return figure, figure.subplots()
+
+
+def _whole_decades(axes: Axes) -> None:
+    """Let the upright axis, a logarithmic one, run from a power of ten to another, and name those alone."""
+    low, high = np.log10(axes.get_ylim())
+    axes.set_ylim(10 ** np.floor(low), 10 ** np.ceil(high))
+    axes.yaxis.set_minor_formatter(NullFormatter())
 
 
 def _frequencies(axes: Axes, y: str) -> None:

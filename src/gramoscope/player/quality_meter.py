@@ -128,7 +128,7 @@ def _by_band(
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio_db = 10 * np.log10(heard / noise)
     return {
-        "centre_hz": np.round(bands.centre_hz, 1),
+        "centre_hz": bands.centre_hz,
         "sound_rms_cm_s": 100 * np.sqrt(heard),
         "error_rms_cm_s": 100 * np.sqrt(noise),
         "signal_to_noise_db": ratio_db,

@@ -204,17 +204,20 @@ def _walls(report: Report) -> str:
 
 def _speed(report: Report) -> str:
     step, places, stated = report["frame_step"], report["group_positions"], report["bench"]["sequence"]
+    found = number(step["measured_mean_um"], "µm", digits=4)
+    spread, away = (_nanometres(um) for um in (step["measured_spread_um"], places["rms_error_of_the_nominal_step_um"]))
+    nominal = number(1e6 * stated["frame_step_m"], "µm", digits=4)
     rows = [
-        (
-            "step from frame to frame",
-            f"{number(step['measured_mean_um'], 'µm', digits=4)} ± {number(step['measured_spread_um'], 'µm')} by "
-            f"{step['steps_measured']} pairs; stated {number(1e6 * stated['frame_step_m'], 'µm', digits=4)}",
-        ),
+        ("step from frame to frame", f"{found} ± {spread} by {step['steps_measured']} pairs; stated {nominal}"),
         ("overlaps of groups matched", f"{places['overlaps_matched']}; {places['overlaps_not_matched']} not"),
-        ("error of the stated group step", number(places["rms_error_of_the_nominal_step_um"], "µm rms")),
-        *((name, text) for name, text in _speed_rows(report["speed"])),
+        ("error of the stated group step", f"{away} rms"),
+        *_speed_rows(report["speed"]),
     ]
     return section("speed", "Speed and wow", facts(rows))
+
+
+def _nanometres(length_um: float | None) -> str:
+    return number(None if length_um is None else 1e3 * length_um, "nm")
 
 
 def _speed_rows(speed: Mapping[str, Any] | None) -> Iterator[tuple[str, str]]:
@@ -249,7 +252,7 @@ def _worst(report: Report, places: Sequence[Place]) -> str:
             alt=f"A frame of group {place.group.number} with the stripes that were found.",
             caption=f"Group {place.group.number}, at {duration(at_s[place.group.number])}: "
             f"{percent(place.group.unread)} of the walls not read; places known to "
-            f"{number(1e6 * place.group.sigma_m, 'µm')}. Dashed lines are filled in.",
+            f"{number(1e9 * place.group.sigma_m, 'nm')}. Dashed lines are filled in.",
         )
         for place in places
     ]
@@ -276,12 +279,18 @@ def _applied(report: Report) -> str:
                 *corners,
                 (
                     "filter and curve differ by",
-                    f"at most {number(response['largest_deviation_db'], 'dB')}, 20 Hz … 20 kHz",
+                    _deviation(response),
                 ),
             ]
         ),
         figures([picture]),
     )
+
+
+def _deviation(response: Report) -> str:
+    largest_db, frequency = response["largest_deviation_db"], response["frequency_hz"]
+    most = "less than 0.001 dB" if largest_db < 1e-3 else f"at most {largest_db:.3f} dB"
+    return f"{most}, {hertz(frequency[0])} … {hertz(frequency[-1])}"
 
 
 def _files(report: Report) -> str:

@@ -9,7 +9,9 @@ density S(k) of slopes and the readings bring the density N(k) of noise, its err
 and what follows for two directions that are read by two walls is the same with matrices, E = (S⁻¹ + Gᵀ N⁻¹ G)⁻¹. White noise
 of places is noise k² N of slopes: the error rises by 6 dB an octave until the prior has the word, and then falls with it.
 N is one over the information that a metre of readings brings. Loudness and information change along the groove, so E is
-found for each of many short runs and averaged. Its integral over all frequencies is the mean of σ², which tests prove.
+found for each of many short runs and averaged. Where a wall is missing over a length L the place is known again behind it:
+what is wrong in between is a bump, white for waves longer than 2L, and its velocity falls with k² there, as everywhere
+else. The integral over all frequencies is the mean of σ², which tests prove.
 """
 
 from __future__ import annotations
@@ -29,6 +31,8 @@ FREQUENCIES_HZ: FloatArray = np.geomspace(5.0, 160_000.0, 181)
 """Twelve an octave."""
 RUN_BINS = 32
 """A tenth of a millimetre: as far as a smoother looks."""
+POOR = 0.1
+"""A wall that brings less than so many times what is usual of it tells little."""
 
 
 def places_error(
@@ -59,9 +63,13 @@ def places_error(
     seen = information.any(axis=1)
     speed = float(course.rotation.speed_at_m_s(np.mean(bins) * step_m))
     wavenumber = 2 * np.pi * FREQUENCIES_HZ / speed
-    believed = _believed(models, starts, lengths, wavenumber)
-    error = _wiener(believed[seen], information[seen], wavenumber, course.gains)
-    return _averaged(2 * speed * error, lengths[seen])
+    shortest = np.pi / _without_a_wall(information, lengths * step_m)[seen, None]
+    looked_at = np.maximum(wavenumber, shortest)
+    believed = _believed(models, starts[seen], lengths[seen], looked_at)
+    error = _wiener(believed, information[seen], looked_at, course.gains) * ((wavenumber / looked_at) ** 2)[:, None]
+    samples = int(lengths[seen].sum())
+    mean = np.einsum("rdf,r->df", error, lengths[seen] / max(samples, 1))
+    return ErrorSpectrum(FREQUENCIES_HZ, 2 * speed * mean, samples)
 
 
 def slopes_error(information_per_m: float, prior: Prior, *, speed_m_s: float, samples: int) -> tuple[FloatArray, int]:
@@ -98,31 +106,31 @@ def _information(accepted: PlaceSamples, bins: tuple[int, int], length_m: FloatA
     return np.asarray(total / length_m[:, None])
 
 
+def _without_a_wall(information: FloatArray, length_m: FloatArray) -> FloatArray:
+    """How long the stretch is, to which each run belongs, in which a wall tells little; infinite where both tell enough."""
+    poor = np.asarray(information <= POOR * np.median(information, axis=0)).any(axis=1)
+    number = np.cumsum(np.append(True, poor[1:] != poor[:-1])) - 1
+    return np.where(poor, np.bincount(number, length_m)[number], np.inf)
+
+
 def _believed(models: Sequence[GrooveModel], starts: IntArray, lengths: IntArray, wavenumber: FloatArray) -> FloatArray:
-    """Densities of the slopes in both directions, shape (run, 2, frequency)."""
-    unit: dict[int, FloatArray] = {}
-    believed = np.empty((starts.size, 2, wavenumber.size))
-    numbers = which(models, (starts + lengths // 2).astype(np.int64))
+    """Densities of the slopes in both directions at the wavenumbers of each run, shape (run, 2, frequency)."""
+    believed = np.empty((starts.size, 2, wavenumber.shape[1]))
+    numbers = which(models, starts + lengths // 2)
     for run, (start, length, number) in enumerate(zip(starts, lengths, numbers, strict=True)):
         model = models[number]
-        if id(model.priors) not in unit:
-            unit[id(model.priors)] = np.stack([prior.slope_density(wavenumber) for prior in model.priors])
-        restless = model.agitation[max(start - model.from_bin, 0) : max(start - model.from_bin, 0) + length]
+        first = max(start - model.from_bin, 0)
+        restless = model.agitation[first : first + length]
         power = model.sigma**2 * (float(np.mean(restless)) if restless.size else 1.0)
-        believed[run] = power[:, None] * unit[id(model.priors)]
+        for i, prior in enumerate(model.priors):
+            believed[run, i] = power[i] * prior.slope_density(wavenumber[run])
     return believed
 
 
 def _wiener(believed: FloatArray, information: FloatArray, wavenumber: FloatArray, gains: FloatArray) -> FloatArray:
     """The diagonal of (S⁻¹ + Gᵀ N⁻¹ G)⁻¹, shape (run, 2, frequency)."""
-    told = information[:, :, None] / wavenumber**2
+    told = information[:, :, None] / wavenumber[:, None] ** 2
     lateral = 1 / believed[:, 0] + told.sum(axis=1)
     vertical = 1 / believed[:, 1] + np.einsum("rwf,w->rf", told, gains**2)
     cross = np.einsum("rwf,w->rf", told, gains)
     return np.asarray(np.stack([vertical, lateral], axis=1) / (lateral * vertical - cross**2)[:, None])
-
-
-def _averaged(density: FloatArray, lengths: IntArray) -> ErrorSpectrum:
-    samples = int(lengths.sum())
-    mean = np.einsum("rdf,r->df", density, lengths / max(samples, 1))
-    return ErrorSpectrum(FREQUENCIES_HZ, mean, samples)
