@@ -29,7 +29,7 @@ from gramoscope.signal_path import Audio
 
 RATE_HZ = 96_000.0
 SOUNDS = ("flat.wav", "equalised.wav")
-NAMES = {*SOUNDS, *(f"{name}.sha256" for name in SOUNDS), "report.json", "groove.png"}
+NAMES = {*SOUNDS, *(f"{name}.sha256" for name in SOUNDS), "report.json", "report.html", "groove.png"}
 FLACS = {"flat.flac", "equalised.flac", "flat.flac.sha256", "equalised.flac.sha256"}
 
 
@@ -53,7 +53,7 @@ def _transfer(
         _write(files, FLAT, level, level, level, samples=samples)
         _write(files, EQUALISED, -level, -level, -level, samples=samples)
         said = files.complete()
-        files.finish({"level": level} if report is None else report, _picture())
+        files.finish({"level": level} if report is None else report, _picture(), f"<p>{level}</p>")
     return said
 
 
@@ -91,6 +91,7 @@ def test_a_transfer_leaves_its_files_and_nothing_else(tmp_path: Path) -> None:
     out = tmp_path / "new" / "deep" / "out"
     assert set(_content(out)) == NAMES
     assert json.loads((out / "report.json").read_text()) == {"level": 0.2}
+    assert (out / "report.html").read_text() == "<p>0.2</p>"
     flat, equalised = soundfile.read(out / "flat.wav")[0], soundfile.read(out / "equalised.wav")[0]
     assert flat.size == equalised.size == 2100
     np.testing.assert_allclose(flat, -equalised, atol=2**-22)
@@ -137,7 +138,7 @@ def test_whatever_goes_wrong_leaves_things_as_they_were(
             if where == "in the block":
                 raise error
             _write(files, EQUALISED, 1.0)
-            files.finish({}, _PictureThatFails(error))
+            files.finish({}, _PictureThatFails(error), "")
 
     with pytest.raises((type(error), OutputError)):
         fail()

@@ -55,7 +55,7 @@ def test_the_bits_do_not_depend_on_the_number_of_workers(
 
 
 def test_the_folder_holds_every_sound_its_sum_the_picture_and_the_report(transfer: Any) -> None:
-    names = {*SOUNDS, *(f"{name}.sha256" for name in SOUNDS), "groove.png", "report.json"}
+    names = {*SOUNDS, *(f"{name}.sha256" for name in SOUNDS), "groove.png", "report.html", "report.json"}
     assert {path.name for path in transfer.folder.iterdir()} == names
     assert tuple(transfer.report["files"]) == SOUNDS
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from base64 import b64encode
 from collections.abc import Iterable, Sequence
 from html import escape
@@ -27,8 +28,13 @@ def bullets(lines: Iterable[str]) -> str:
 
 def facts(rows: Iterable[tuple[str, str]], *, caption: str = "") -> str:
     """Return a table of names and values, the names as headers of its rows."""
-    body = "".join(f'<tr><th scope="row">{escape(name)}</th><td>{escape(value)}</td></tr>' for name, value in rows)
+    body = "".join(f'<tr><th scope="row">{_breakable(name)}</th><td>{escape(value)}</td></tr>' for name, value in rows)
     return f'<div class="wide"><table class="facts">{_caption(caption)}<tbody>{body}</tbody></table></div>'
+
+
+def _breakable(name: str) -> str:
+    """A name that may be broken behind its points and underscores, and nowhere else."""
+    return re.sub(r"([._])(?=\w)", r"\1<wbr>", escape(name))
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], *, caption: str = "") -> str:

@@ -20,7 +20,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gramoscope.conventions import FloatArray, IntArray
+from gramoscope.conventions import BoolArray, FloatArray, IntArray
 from gramoscope.signal_path import ErrorSpectrum
 from gramoscope.tonearm.course import Course
 from gramoscope.tonearm.groove_model import GrooveModel, which
@@ -108,7 +108,8 @@ def _information(accepted: PlaceSamples, bins: tuple[int, int], length_m: FloatA
 
 def _without_a_wall(information: FloatArray, length_m: FloatArray) -> FloatArray:
     """How long the stretch is, to which each run belongs, in which a wall tells little; infinite where both tell enough."""
-    poor = np.asarray(information <= POOR * np.median(information, axis=0)).any(axis=1)
+    usual: FloatArray = np.asarray(np.median(information, axis=0), np.float64)
+    poor: BoolArray = np.any(information <= POOR * usual, axis=1)
     number = np.cumsum(np.append(True, poor[1:] != poor[:-1])) - 1
     return np.where(poor, np.bincount(number, length_m)[number], np.inf)
 
