@@ -2,7 +2,8 @@
 
     python -m benchmarks.accuracy.error_spectrum CAPTURE … --out DIR
 
-plays each with the recipe `best` and prints a table: claimed error ÷ real error of each octave, root mean squares.
+plays each with the recipe `best` and prints claimed error ÷ real error of each octave, root mean squares. Gain and delay of
+the copy are taken out, as `gramoscope compare` does, and what was bridged is left out.
 """
 
 from __future__ import annotations
@@ -32,11 +33,26 @@ def real_error_cm_s(capture: Path, played: Path) -> FloatArray:
     heard, rate_hz = load_for_comparison(played / "flat.wav")
     true = truth_sound(capture / "truth.npz", rate_hz=rate_hz, cut="stronger")
     size = min(len(heard), len(true))
-    error = (heard[:size, 0] - true[:size])[TRIM:-TRIM]
+    error, seen = aligned_error(heard[:size, 0], true[:size]), _measured(report, size)
+    error, share = (error * seen)[TRIM:-TRIM], float(seen[TRIM:-TRIM].mean())
     segment = report["quality"]["spectrum"]["segment_samples"]
     frequency_hz, density = welch(error, rate_hz, nperseg=min(segment, error.size))
     bands = octaves(1.42 * max(report["quality"]["spectrum"]["octaves"]["centre_hz"]))
-    return 100 * np.sqrt(band_power(frequency_hz, density, bands))
+    return 100 * np.sqrt(band_power(frequency_hz, density / share, bands))
+
+
+def aligned_error(heard: FloatArray, true: FloatArray) -> FloatArray:
+    """Return what is left of a sound when the truth, with the gain and the small delay that suit it best, is taken off."""
+    known = np.stack([true, np.gradient(true)])[:, TRIM:-TRIM]
+    gain, delay = np.linalg.lstsq(known.T, heard[TRIM:-TRIM], rcond=None)[0]
+    return np.asarray(heard - gain * true - delay * np.gradient(true))
+
+
+def _measured(report: dict[str, Any], size: int) -> FloatArray:
+    """1 where all samples of a point of the strip chart were measured, else 0."""
+    along = report["quality"]["along_time"]
+    run = round(along["step_s"] * report["rate_hz"])
+    return np.repeat(np.array(along["measured"]) == 1, run)[:size].astype(np.float64)
 
 
 def ratios(capture: Path, played: Path) -> dict[float, float]:
@@ -55,7 +71,8 @@ def main() -> None:
     arguments = parser.parse_args()
     for capture in arguments.captures:
         played = arguments.out / capture.name
-        play(open_capture(capture), load_recipe("best"), played, Settings())
+        if not (played / "report.json").exists():
+            play(open_capture(capture), load_recipe("best"), played, Settings())
         found = "  ".join(f"{f:g} Hz {ratio:.2f}" for f, ratio in ratios(capture, played).items())
         print(f"{capture.name}: {found}", flush=True)
 

@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import welch
 
@@ -33,6 +33,7 @@ def test_it_is_the_spectrum_that_scipy_finds() -> None:
     np.testing.assert_allclose(density, expected[1], rtol=1e-9)
 
 
+@settings(deadline=None)
 @given(st.lists(st.integers(0, 3000), max_size=7))
 def test_not_a_bit_depends_on_how_the_sound_is_cut(cuts: list[int]) -> None:
     rng = np.random.default_rng(2)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gramoscope.conventions import INNER, OUTER
@@ -78,7 +78,8 @@ def test_the_shares_of_the_whole_add_up() -> None:
     assert np.isnan([*StripChart(3).shares().values(), StripChart(3).mean_variance()]).all()
 
 
-@given(st.lists(st.integers(0, 1000), max_size=6), st.integers(1, 400))
+@settings(deadline=None)
+@given(st.lists(st.integers(0, 1000), max_size=6), st.integers(20, 400))
 def test_not_a_bit_of_the_chart_depends_on_how_the_sound_is_cut(cuts: list[int], samples_per_point: int) -> None:
     audio = _audio()
     whole, parts = _chart([audio], samples_per_point), _chart(_pieces(audio, cuts), samples_per_point)

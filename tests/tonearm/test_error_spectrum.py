@@ -101,7 +101,7 @@ def test_a_chip_takes_from_long_waves_what_they_lose_by_it_and_no_more(bench: An
         real = float(np.sum(density[band])) * (frequency[1] - frequency[0])
         claimed = _power(_mean(pieces)[0], low_hz, 2 * low_hz)
         # without the rule for waves longer than the chip it is 8 at 250 Hz; with chips averaged away it is 0.2
-        assert 0.75 < np.sqrt(claimed / real) < 2.0, low_hz
+        assert 0.7 < np.sqrt(claimed / real) < 1.4, low_hz
 
 
 def test_where_the_readings_have_the_word_it_rises_by_6_db_an_octave(

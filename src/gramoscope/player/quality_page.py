@@ -150,8 +150,8 @@ def _spectra(report: Report) -> str:
             figure(
                 svg_of(density_figure(frequency, values, highest_hz=highest_hz)),
                 alt="Density of the claimed error against frequency.",
-                caption="Density of the claimed error: it rises by 6 dB an octave while the readings have the word, and falls "
-                "where the sound drowns and only what is usual of records is known.",
+                caption="Density of the claimed error: in general it rises by 6 dB an octave while the readings have the word, "
+                "and falls where the sound drowns and only what is usual of records is known.",
             )
         )
     return section(

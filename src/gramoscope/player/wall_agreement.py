@@ -35,7 +35,7 @@ class WallAgreement:
     def __init__(self, course: Course) -> None:
         self._course = course
         self._count = self._far = 0
-        self._sums = np.zeros(8)
+        self._sums = np.zeros(7)
 
     def add(self, trace: WallTrace) -> None:
         """Take in a stretch."""
@@ -59,19 +59,19 @@ class WallAgreement:
         away = (y - x) ** 2
         self._count += x.size
         self._far += int(np.count_nonzero(away > FAR**2 * expected))
-        parts = (x, y, x * x, y * y, x * y, away, expected, away / expected)
+        parts = (x, y, x * x, y * y, x * y, away / expected, 1 / expected)
         self._sums += [float(part.sum()) for part in parts]
 
     def as_dict(self) -> dict[str, Any] | None:
-        """Return what was found; None where both walls were never read at the same place."""
+        """Return what was found, by means weighted with 1/variance; None where both walls were never read at one place."""
         if self._count == 0:
             return None
-        x, y, xx, yy, xy, away, expected, chi = self._sums / self._count
+        x, y, xx, yy, xy, chi, information = self._sums / self._count
         spread = np.sqrt(max(xx - x * x, 0.0) * max(yy - y * y, 0.0))
         return {
             "samples": self._count,
-            "rms_difference_cm_s": 100 * float(np.sqrt(away)),
-            "expected_difference_cm_s": 100 * float(np.sqrt(expected)),
+            "rms_difference_cm_s": 100 * float(np.sqrt(chi / information)),
+            "expected_difference_cm_s": 100 * float(1 / np.sqrt(information)),
             "chi_squared_per_sample": float(chi),
             "share_beyond_5_sigma": self._far / self._count,
             "correlation": float((xy - x * y) / spread) if spread > 0 else float("nan"),
