@@ -170,3 +170,15 @@ def test_a_picture_that_cannot_be_written_is_an_output_error(tmp_path: Path) -> 
     with pytest.raises(OutputError, match="create the folder"):
         save_png(_groove(), tmp_path / "nowhere" / "a.png")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_figures_of_a_passage_of_which_nothing_is_known_can_be_drawn() -> None:
+    nothing, silent = [None, None, None], [0.0, 0.0, 0.0]
+    along = {"step_s": 0.5, "measured": silent, "bridged": silent, "missing": [1.0, 1.0, 1.0]}
+    bands = {"centre_hz": [500.0, 1000.0, 2000.0], "sound_rms_cm_s": nothing, "error_rms_cm_s": nothing}
+    for figure in (
+        share_figure({**along, "rms_cm_s": silent, "sigma_rms_cm_s": nothing}),
+        band_figure(bands),
+        band_figure({**bands, "sound_rms_cm_s": silent}),
+    ):
+        assert svg_of(figure).startswith(b"<?xml")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import platform
+import re
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -98,3 +99,52 @@ def test_every_flag_is_explained_and_counted(transfer: Any) -> None:
 def test_a_listener_is_told_that_one_wall_alone_was_read(transfer: Any) -> None:
     assert len(transfer.report["walls_read"]) == 1
     assert "vertical motion" in transfer.report["remarks"][0]
+
+
+def _keys(value: Any, of: str = "") -> set[str]:
+    if isinstance(value, dict):
+        free = (
+            "recipe",
+            "bench",
+            "flags",
+            "versions",
+            "files",
+            "flagged_samples",
+            "flagged_pickup_samples",
+            "common_files",
+        )
+        below = set() if of in free else {key for name, inner in value.items() for key in _keys(inner, name)}
+        return below | (set() if of in free else set(value))
+    return {key for inner in value for key in _keys(inner, of)} if isinstance(value, list) else set()
+
+
+def test_every_key_is_documented(transfer: Any) -> None:
+    document = (Path(__file__).parents[2] / "docs" / "reference" / "report.md").read_text(encoding="utf-8")
+    keys = _keys(transfer.report)
+    assert {"wall_agreement", "sha256_of_sha256sum_lines", "worst_groups", "at_s"} <= keys
+    named = set(re.findall(r"\w+", " ".join(re.findall(r"`([^`\n]+)`", document))))
+    assert sorted(keys - named) == []
+
+
+def test_shares_are_of_the_whole_and_add_up(transfer: Any) -> None:
+    share = transfer.report["share"]
+    assert share["bridged"] + share["missing"] == pytest.approx(share["interpolated"])
+    along = transfer.report["quality"]["along_time"]
+    assert np.mean(along["measured"]) == pytest.approx(share["measured"], abs=0.01)
+    assert len(along["measured"]) <= 241
+
+
+def test_the_bands_add_up_to_the_sound_and_to_the_error_bars(transfer: Any) -> None:
+    spectrum = transfer.report["quality"]["spectrum"]
+    error = np.array(spectrum["octaves"]["error_rms_cm_s"], np.float64)
+    rms_cm_s = transfer.report["noise_estimate"]["sigma_rms_cm_s"]
+    assert np.sqrt(np.nansum(error**2)) == pytest.approx(rms_cm_s, rel=0.1)
+    assert spectrum["error_bars_over_model"] == pytest.approx(1.0, abs=0.35)
+    sound = np.array(spectrum["octaves"]["sound_rms_cm_s"], np.float64)
+    assert np.sqrt(np.nansum(sound**2)) == pytest.approx(transfer.report["level"]["rms_cm_s"], rel=0.25)
+
+
+def test_numbers_of_a_table_stand_in_one_line(transfer: Any) -> None:
+    text = (transfer.folder / "report.json").read_text(encoding="utf-8")
+    assert re.search(r'"measured": \[[\d., ]+\]', text)
+    assert len(text.splitlines()) < 700

@@ -80,10 +80,11 @@ def share_figure(along_time: Mapping[str, Any]) -> Figure:
         above.stairs(top, edge, baseline=floor, fill=True, color=colour, label=name)
         floor = top
     above.set_ylim(0, 100)
-    below.stairs(along_time["rms_cm_s"], edge, baseline=None, color=ink.BLUE, linewidth=1.3, label="sound")
-    below.stairs(
-        along_time["sigma_rms_cm_s"], edge, baseline=None, color=ink.VERMILLION, linewidth=1.3, label="claimed error"
-    )
+    for name, colour, label in (("rms_cm_s", ink.BLUE, "sound"), ("sigma_rms_cm_s", ink.VERMILLION, "claimed error")):
+        values = np.asarray(along_time[name], np.float64)
+        below.stairs(
+            np.where(values > 0, values, np.nan), edge, baseline=None, color=colour, linewidth=1.3, label=label
+        )
     below.set_yscale("log")
     _whole_decades(below)
     for axes, x, y, columns in ((above, "", "share (%)", 3), (below, f"time ({unit})", "rms (cm/s)", 2)):

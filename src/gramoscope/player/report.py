@@ -51,7 +51,7 @@ def transfer_report(
         "catalogue": {name: text for name, text in asdict(settings.catalogue).items() if name != "made"},
         "command": command_line(),
         "settings": settings_of(settings),
-        "capture": str(capture.folder),
+        "capture": str(capture.folder.resolve()),
         "capture_name": capture.folder.resolve().name,
         "capture_from_here": from_folder(capture.folder, folder),
         "layout": capture.layout,
