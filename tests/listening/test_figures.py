@@ -14,6 +14,8 @@ from gramoscope.errors import ArgumentError, OutputError
 from gramoscope.listening.align import band_passed
 from gramoscope.listening.compare import compare
 from gramoscope.listening.figures import StripeLine, Waveform, comparison_figure, groove_figure, save_png
+from gramoscope.listening.ink import svg_of
+from gramoscope.listening.quality_figures import band_figure, share_figure
 
 HEIGHT_PX, WIDTH_PX = 90, 211
 PITCH_M = 0.5e-6

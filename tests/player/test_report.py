@@ -141,7 +141,9 @@ def test_the_bands_add_up_to_the_sound_and_to_the_error_bars(transfer: Any) -> N
     assert np.sqrt(np.nansum(error**2)) == pytest.approx(rms_cm_s, rel=0.1)
     assert spectrum["error_bars_over_model"] == pytest.approx(1.0, abs=0.35)
     sound = np.array(spectrum["octaves"]["sound_rms_cm_s"], np.float64)
-    assert np.sqrt(np.nansum(sound**2)) == pytest.approx(transfer.report["level"]["rms_cm_s"], rel=0.25)
+    # of four milliseconds the octaves below 1.4 kHz cannot be told, and with them the tone of 910 Hz
+    share = np.sqrt(np.nansum(sound**2)) / transfer.report["level"]["rms_cm_s"]
+    assert 0.44 < share < 0.75
 
 
 def test_numbers_of_a_table_stand_in_one_line(transfer: Any) -> None:
