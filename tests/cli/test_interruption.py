@@ -103,6 +103,8 @@ def _require_valid(file: Path) -> None:
     elif file.suffix in (".wav", ".flac"):
         samples, _ = soundfile.read(file)
         assert samples.size == soundfile.info(file).frames * soundfile.info(file).channels
+    elif file.suffix == ".html":
+        assert file.read_bytes().endswith(b"</html>\n"), "a whole page"
     else:
         assert file.read_bytes()[-12:-4] == b"\0\0\0\0IEND", "a whole picture"
 

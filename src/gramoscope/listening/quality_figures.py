@@ -5,7 +5,7 @@ Small ones, for a page that is read on a phone too.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,8 @@ from gramoscope.listening import ink
 from gramoscope.listening.ink import readable_time
 
 WIDTH_IN, HEIGHT_IN = 4.6, 3.1
+NOTHING = (1e-3, 1.0)
+"""The upright axis of what has no positive values."""
 SHARES = (("measured", ink.BLUE), ("bridged", ink.ORANGE), ("missing", ink.VERMILLION))
 
 
@@ -30,9 +32,7 @@ def band_figure(bands: Mapping[str, Any]) -> Figure:
         `centre_hz`, `sound_rms_cm_s`, `error_rms_cm_s`: arrays of one length; NaN is not drawn.
     """
     figure, axes = _blank()
-    centre, sound, error = (
-        np.asarray(bands[name], np.float64) for name in ("centre_hz", "sound_rms_cm_s", "error_rms_cm_s")
-    )
+    centre, sound, error = (_positive(bands[name]) for name in ("centre_hz", "sound_rms_cm_s", "error_rms_cm_s"))
     axes.fill_between(centre, error, sound, where=sound > error, color=ink.SKY, alpha=0.25, lw=0)
     axes.loglog(centre, sound, color=ink.BLUE, linewidth=1.6, label="sound")
     axes.loglog(centre, error, color=ink.VERMILLION, linewidth=1.6, linestyle=(0, (4, 2)), label="claimed error")
@@ -81,10 +81,7 @@ def share_figure(along_time: Mapping[str, Any]) -> Figure:
         floor = top
     above.set_ylim(0, 100)
     for name, colour, label in (("rms_cm_s", ink.BLUE, "sound"), ("sigma_rms_cm_s", ink.VERMILLION, "claimed error")):
-        values = np.asarray(along_time[name], np.float64)
-        below.stairs(
-            np.where(values > 0, values, np.nan), edge, baseline=None, color=colour, linewidth=1.3, label=label
-        )
+        below.stairs(_positive(along_time[name]), edge, baseline=None, color=colour, linewidth=1.3, label=label)
     below.set_yscale("log")
     _whole_decades(below)
     for axes, x, y, columns in ((above, "", "share (%)", 3), (below, f"time ({unit})", "rms (cm/s)", 2)):
@@ -94,6 +91,12 @@ def share_figure(along_time: Mapping[str, Any]) -> Figure:
     return figure
 
 
+def _positive(values: Sequence[float | None] | FloatArray) -> FloatArray:
+    """NaN for what is unknown, and for what a logarithmic axis cannot show."""
+    known = np.asarray(values, np.float64)
+    return np.where(known > 0, known, np.nan)
+
+
 def _blank() -> tuple[Figure, Axes]:
     figure = ink.blank_figure(WIDTH_IN, HEIGHT_IN)
     return figure, figure.subplots()
@@ -101,8 +104,10 @@ def _blank() -> tuple[Figure, Axes]:
 
 def _whole_decades(axes: Axes) -> None:
     """Let the upright axis, a logarithmic one, run from a power of ten to another, and name those alone."""
-    low, high = np.log10(axes.get_ylim())
-    axes.set_ylim(10 ** np.floor(low), 10 ** np.ceil(high))
+    low, high = axes.get_ylim()
+    if low <= 0:  # nothing was drawn that such an axis could show
+        low, high = NOTHING
+    axes.set_ylim(10 ** np.floor(np.log10(low)), 10 ** np.ceil(np.log10(high)))
     axes.yaxis.set_minor_formatter(NullFormatter())
 
 
