@@ -5,16 +5,18 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from gramoscope.apparatus.capture import open_capture
 from gramoscope.cli.main import main
 from gramoscope.errors import ArgumentError, CaptureError
 from gramoscope.player.again import load_again
 from gramoscope.player.play import Settings
-from gramoscope.player.provenance import recipe_of
+from gramoscope.player.provenance import recipe_of, settings_of
 from gramoscope.player.recipe import load_recipe, shipped_recipes
 
 SOUNDS = ("flat.wav", "walls.wav", "vertical.wav", "equalised.wav")
@@ -186,6 +188,31 @@ def test_settings_of_a_later_version_are_refused(first: Path, tmp_path: Path, fi
     again = load_again(_changed(first, tmp_path / "x", settings=settings))
     with pytest.raises(ArgumentError, match="loudness_war"):
         again.settings(film, 1)
+
+
+@dataclass(frozen=True)
+class _Speed:
+    knots: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class _MoreSettings(Settings):
+    speed: _Speed = field(default_factory=_Speed)
+
+
+def test_settings_that_are_tables_come_back_as_what_they_were(
+    first: Path, capture: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gramoscope.player.play.Settings", _MoreSettings)
+    chosen = _MoreSettings(speed=_Speed((78.26, 77.92)), flac=True)
+    settings = json.loads(json.dumps(settings_of(chosen)))
+    assert settings["speed"] == {"knots": [78.26, 77.92]}
+    again = load_again(_changed(first, tmp_path / "x", settings=settings)).settings(open_capture(capture), 3)
+    assert isinstance(again, _MoreSettings)
+    assert (again.speed, again.flac, again.workers) == (chosen.speed, True, 3)
+    wrong = load_again(_changed(first, tmp_path / "y", settings={**settings, "speed": {"knots": "fast"}}))
+    with pytest.raises(ArgumentError, match=r"settings\.speed"):
+        wrong.settings(open_capture(capture), 1)
 
 
 @pytest.mark.parametrize("name", shipped_recipes())

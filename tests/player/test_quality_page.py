@@ -73,10 +73,21 @@ def test_it_can_be_made_again_from_the_file(html: str, transfer: Any) -> None:
 
 
 def test_what_curves_find_of_the_speed_has_its_place(transfer: Any) -> None:
-    told = {**transfer.report, "speed": {"wow_percent": 0.31, "advice": "78.26 rpm", "table": [1, 2]}}
-    words = _Page(quality_page(told, [])).words
-    assert "wow percent0.31" in words
-    assert "advice78.26 rpm" in words
+    told = {
+        **transfer.report,
+        "speed": {"rpm": 78.26},
+        "wow": {"hole": {"percent": 0.31}},
+        "hints": {"hum": {"words": "50 Hz"}},
+    }
+    words = _Page(quality_page({**told, "repair": {"history": ["declicked", "rumble below 20 Hz"]}}, [])).words
+    for said in (
+        "speed, rpm78.26",
+        "wow, hole, percent0.31",
+        "hints, hum, words50 Hz",
+        "declicked; rumble below 20 Hz",
+    ):
+        assert said in words
+    assert "nothing was repaired" in _Page(quality_page(transfer.report, [])).words
 
 
 def _chromium(page: Path, folder: Path, *arguments: str) -> bytes:

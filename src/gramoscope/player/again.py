@@ -11,7 +11,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_type_hints
+
+from pydantic import TypeAdapter, ValidationError
 
 from gramoscope.apparatus.capture import Capture
 from gramoscope.apparatus.fingerprint import sha256_of_file
@@ -74,7 +76,17 @@ class Again:
         if not words["reference"] and capture.folder.resolve().name != self.report["capture_name"]:
             words["reference"] = ascii_text(self.report["capture_name"])[:REFERENCE]
         catalogue = Catalogue(**words, made=datetime.fromisoformat(self.report["made"]))
-        return Settings(**self.report["settings"], catalogue=catalogue, workers=workers)
+        return Settings(**self._chosen(get_type_hints(Settings)), catalogue=catalogue, workers=workers)
+
+    def _chosen(self, kinds: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the settings as they were, tables made into what they are tables of."""
+        chosen = {}
+        for name, value in self.report["settings"].items():
+            try:
+                chosen[name] = TypeAdapter(kinds[name]).validate_json(json.dumps(value), strict=True)
+            except ValidationError as error:
+                raise ArgumentError(f"{self.path}: settings.{name} = {value!r}", error.errors()[0]["msg"]) from error
+        return chosen
 
     def other_versions(self) -> dict[str, dict[str, str | None]]:
         """Return what has another version now: name → then and now."""

@@ -6,7 +6,7 @@ import hashlib
 import json
 import platform
 import sys
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from importlib.metadata import version
 from os.path import relpath
 from pathlib import Path, PurePath
@@ -41,7 +41,7 @@ def bench_of(capture: Capture) -> dict[str, Any]:
 
 def settings_of(settings: Settings) -> dict[str, Any]:
     """Return what the listener chose, beside the recipe and the catalogue, as far as the result depends on it."""
-    return {one.name: getattr(settings, one.name) for one in fields(settings) if one.name not in _NO_INFLUENCE}
+    return {name: value for name, value in asdict(settings).items() if name not in _NO_INFLUENCE}
 
 
 def from_folder(path: Path, folder: Path) -> str | None:

@@ -12,11 +12,13 @@ from gramoscope.listening.page import bullets, facts, figure, figures, page, par
 from gramoscope.listening.quality_figures import band_figure, density_figure, response_figure, share_figure
 from gramoscope.listening.report import plain
 from gramoscope.player.page_provenance import provenance_section
-from gramoscope.player.page_words import UNKNOWN, decibels, duration, hertz, number, percent
+from gramoscope.player.page_words import decibels, duration, flat_rows, hertz, number, percent
 from gramoscope.player.picture import Place
 
 Report = Mapping[str, Any]
 SHOWN_PROBLEMS = 20
+SPEED_KEYS = ("speed", "wow", "hints")
+"""Keys of the report under which there may be tables of what was found of the speed."""
 
 
 def quality_page(report: Report, places: Sequence[Place]) -> str:
@@ -72,8 +74,14 @@ def _summary(report: Report) -> Iterator[tuple[str, str]]:
     yield "What to look at", _first_look(report)
     yield (
         "What was applied",
-        f"to equalised.wav: {report['response']['title']}; to the other files nothing: not equalised, normalised or repaired",
+        f"to equalised.wav: {report['response']['title']}; {_repairs(report)}; nothing was normalised, and flat.wav is as it "
+        "was read",
     )
+
+
+def _repairs(report: Report) -> str:
+    repair = report.get("repair")
+    return f"repaired: {'; '.join(repair['history'])}" if repair else "nothing was repaired"
 
 
 def _first_look(report: Report) -> str:
@@ -211,7 +219,7 @@ def _speed(report: Report) -> str:
         ("step from frame to frame", f"{found} ± {spread} by {step['steps_measured']} pairs; stated {nominal}"),
         ("overlaps of groups matched", f"{places['overlaps_matched']}; {places['overlaps_not_matched']} not"),
         ("error of the stated group step", f"{away} rms"),
-        *_speed_rows(report["speed"]),
+        *_speed_rows(report),
     ]
     return section("speed", "Speed and wow", facts(rows))
 
@@ -220,12 +228,11 @@ def _nanometres(length_um: float | None) -> str:
     return number(None if length_um is None else 1e3 * length_um, "nm")
 
 
-def _speed_rows(speed: Mapping[str, Any] | None) -> Iterator[tuple[str, str]]:
-    for name, value in (speed or {}).items():
-        if isinstance(value, str) or value is None:
-            yield name.replace("_", " "), value or UNKNOWN
-        elif isinstance(value, bool | int | float):
-            yield name.replace("_", " "), number(value, digits=5)
+def _speed_rows(report: Report) -> Iterator[tuple[str, str]]:
+    """Whatever was found of the speed, by its names."""
+    for key in SPEED_KEYS:
+        for name, text in flat_rows(report.get(key) or {}, key):
+            yield name.replace(".", ", ").replace("_", " "), text
 
 
 def _calibration(report: Report) -> str:
@@ -272,7 +279,7 @@ def _applied(report: Report) -> str:
     return section(
         "applied",
         "The response that was applied",
-        paragraph("To equalised.wav only; all other files are flat."),
+        paragraph("To equalised.wav only; no other file is equalised."),
         facts(
             [
                 ("curve", response["title"]),
