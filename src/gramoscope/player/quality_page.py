@@ -88,11 +88,15 @@ def _first_look(report: Report) -> str:
     doubtful = [row["what"] for row in report["calibration_check"] if row["verdict"] != "as stated"]
     problems = len(report["problems"]) + report["problems_not_listed"] + len(report["capture_problems"])
     found = [
-        *([f"{len(report['remarks'])} remark(s) below"] if report["remarks"] else []),
-        *([f"{problems} problem(s) of the film"] if problems else []),
+        *([f"{_several(len(report['remarks']), 'remark')} below"] if report["remarks"] else []),
+        *([f"{_several(problems, 'problem')} of the film"] if problems else []),
         *([f"apparatus not as stated: {', '.join(doubtful)}"] if doubtful else []),
     ]
     return "; ".join(found) or "nothing stands out; see the worst places below"
+
+
+def _several(number_of: int, thing: str) -> str:
+    return f"{number_of} {thing}" if number_of == 1 else f"{number_of} {thing}s"
 
 
 def _look_at(report: Report) -> str:
@@ -158,8 +162,9 @@ def _spectra(report: Report) -> str:
             figure(
                 svg_of(density_figure(frequency, values, highest_hz=highest_hz)),
                 alt="Density of the claimed error against frequency.",
-                caption="Density of the claimed error: in general it rises by 6 dB an octave while the readings have the word, "
-                "and falls where the sound drowns and only what is usual of records is known.",
+                caption="Density of the claimed error. While the readings have the word it is theirs: white errors of places "
+                "rise by 6 dB an octave, those of slopes stay level. It falls where the sound drowns and only what is usual "
+                "of records is known.",
             )
         )
     return section(
