@@ -29,12 +29,14 @@ from gramoscope.pickup.texture.sharpness import sharpness
 from gramoscope.pickup.texture_likelihood import TexturePickup, samples_of, sight_of
 from gramoscope.player.play import learned
 from gramoscope.player.recipe import load_recipe
+from gramoscope.player.workers import in_order
 from gramoscope.preamp.resample import Resampler
 from gramoscope.signal_path import FrameGroup, GrooveMotion, WallTrace
 from gramoscope.simulation.demo_sound import demo_sound
 from gramoscope.simulation.film_sound import film_sound
 from gramoscope.simulation.scene import filming_bench, named_scene
 from gramoscope.tonearm.follow import Tonearm
+from gramoscope.tonearm.splice import Splice
 
 Row = tuple[str, float, float]
 """Stage, seconds a group, bytes of film that it has to read."""
@@ -91,20 +93,38 @@ def timed(work: Callable[[], object], groups: int) -> float:
     return (time.perf_counter() - started) / groups
 
 
+def following(capture: Capture) -> tuple[Splice, Tonearm, Resampler]:
+    """Return what comes after the pickup."""
+    recipe, bench = load_recipe("best"), capture.bench
+    direction = direction_of_cut(bench.disc.cut)
+    arm = Tonearm(bench.rotation, direction, bench.disc.wall_angle_rad, bench.passage_length_m, recipe.smoother)
+    return recipe.splice, arm, Resampler(bench.rotation, 96_000.0, recipe.passband)
+
+
 def following_stages(capture: Capture, traces: list[WallTrace]) -> list[Row]:
     """Time what comes after the pickup, which is one stream."""
-    recipe, bench = load_recipe("best"), capture.bench
-    direction, count = direction_of_cut(bench.disc.cut), len(traces)
+    splice, arm, resampler = following(capture)
     spliced: list[WallTrace] = []
     motion: list[GrooveMotion] = []
-    arm = Tonearm(bench.rotation, direction, bench.disc.wall_angle_rad, bench.passage_length_m, recipe.smoother)
-    resampler = Resampler(bench.rotation, 96_000.0, recipe.passband)
-    list(arm.follow(trace for trace, _ in recipe.splice.join(iter(traces))))  # compiles
+    list(arm.follow(trace for trace, _ in splice.join(iter(traces))))  # compiles
+    count = len(traces)
     return [
-        ("splice", timed(lambda: spliced.extend(t for t, _ in recipe.splice.join(iter(traces))), count), 0.0),
+        ("splice", timed(lambda: spliced.extend(t for t, _ in splice.join(iter(traces))), count), 0.0),
         ("tonearm", timed(lambda: motion.extend(arm.follow(iter(spliced))), count), 0.0),
         ("place to time", timed(lambda: list(resampler.resample(iter(motion))), count), 0.0),
     ]
+
+
+def played(capture: Capture, pickup: TexturePickup, film: list[FrameGroup], threads: int) -> float:
+    """Play from frames in memory to sound, as `play` does; return the seconds that a group took."""
+    splice, arm, resampler = following(capture)
+
+    def sounded() -> None:
+        traces = in_order(pickup.read, film, workers=threads)
+        for _ in resampler.resample(arm.follow(trace for trace, _ in splice.join(traces))):
+            pass
+
+    return timed(sounded, len(film))
 
 
 def measured_rows(groups: int) -> tuple[list[Row], Capture, int]:
@@ -118,14 +138,14 @@ def measured_rows(groups: int) -> tuple[list[Row], Capture, int]:
     traces, alone = read_by(pickup, film, 1)
     again, together = read_by(pickup, film, 2)
     assert all(np.array_equal(a.offset_m, b.offset_m, equal_nan=True) for a, b in zip(traces, again, strict=True))
-    after = following_stages(capture, traces)
     film_bytes = float(film[0].images.nbytes)
     rows += [
         ("reading, all groups, one thread", alone, film_bytes),
         ("the same, two threads", together, film_bytes),
-        *after,
+        *following_stages(capture, traces),
+        ("in all, one thread for reading", played(capture, pickup, film, 1), film_bytes),
+        ("in all, two threads for reading", played(capture, pickup, film, 2), film_bytes),
     ]
-    rows.append(("in all, two threads", together + sum(row[1] for row in after), film_bytes))
     return rows, capture, film[0].images.size
 
 
