@@ -85,7 +85,7 @@ def test_the_first_exception_is_raised_and_nothing_more_begins() -> None:
             raise ValueError(f"task {number}")
         return number
 
-    answers = in_order(work, range(1000), workers=2)
+    answers = in_order(work, range(1000), workers=2, ahead=0)
     assert [next(answers) for _ in range(4)] == [0, 1, 2, 3]
     with pytest.raises(ValueError, match="task 4"):
         next(answers)
@@ -106,7 +106,7 @@ def test_a_consumer_that_stops_shuts_the_pool_down(kind: type[BaseException]) ->
         return number
 
     def consume() -> None:
-        for number in in_order(work, range(1000), workers=2):
+        for number in in_order(work, range(1000), workers=2, ahead=0):
             if number == 3:
                 raise kind
 
