@@ -17,7 +17,7 @@ from scipy import ndimage
 
 from gramoscope.apparatus.bench import Bench
 from gramoscope.camera.exposure import Exposure
-from gramoscope.conventions import INNER, OUTER, BoolArray, Float32Array, FloatArray, IntArray
+from gramoscope.conventions import INNER, OUTER, Float32Array, FloatArray, IntArray
 from gramoscope.errors import require
 from gramoscope.pickup.cartridge import Line, Sketch, Spread
 from gramoscope.pickup.overlay import TILE_COLUMNS, Overlay, overlay, overlay_width, slope_along, tiles_about
@@ -344,10 +344,9 @@ UNSEEN = Quality.NO_STRIPE | Quality.INTERPOLATED
 UNTAUGHT = "too little of the stripes is seen to learn their texture; the recipe seed-paper reads single groups"
 
 
-def burnt_places(laid: Overlay, white_level: int) -> BoolArray:
-    """Return what is burnt out, shape (column, row); of no rows when nothing is."""
-    burnt = laid.columns >= NEARLY_WHITE * white_level
-    return burnt if burnt.any() else burnt[:, :0]
+def burnt_places(laid: Overlay, white_level: int) -> IntArray:
+    """Return column and row of what is burnt out, shape (place, 2)."""
+    return np.argwhere(laid.columns >= NEARLY_WHITE * white_level)
 
 
 def samples_of(stretch: Stretch, found: Evidence) -> tuple[FloatArray, FloatArray]:

@@ -144,16 +144,16 @@ def clear_columns(
 
 @numba.njit(cache=True, nogil=True)
 def _clear(usable, burnt, support, rows, half_px, least_support, burnt_share, clear):  # type: ignore[no-untyped-def]
-    """Take away what is not usable, has no support, or is burnt; beyond the picture its outermost row counts."""
-    height = burnt.shape[1]
+    """Take away what is not usable, has no support, or is burnt."""
+    spoilt = np.zeros(usable.size, np.int64)
     for i in range(rows.shape[0]):
         for x in range(usable.size):
             clear[i, x] &= usable[x] and support[i, x] >= least_support
-            if clear[i, x] and height:
-                middle, spoilt = int(np.rint(rows[i, x])), 0
-                for row in range(middle - half_px, middle + half_px + 1):
-                    spoilt += burnt[x, min(max(row, 0), height - 1)]
-                clear[i, x] = spoilt <= burnt_share * (2 * half_px + 1)
+        spoilt[:] = 0
+        for x, row in burnt:
+            spoilt[x] += abs(row - np.rint(rows[i, x])) <= half_px
+        for x, _ in burnt:
+            clear[i, x] &= spoilt[x] <= burnt_share * (2 * half_px + 1)
 
 
 @numba.njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from gramoscope.conventions import BoolArray, Float32Array, FloatArray
+from gramoscope.conventions import BoolArray, Float32Array, FloatArray, IntArray
 from gramoscope.pickup.texture.tone import Tone
 
 AS_IT_IS = Tone()
@@ -20,8 +20,8 @@ class Stretch:
         The registered picture, transposed.
     usable : bool array, shape (column,)
         Columns that rest on enough frames.
-    burnt : bool array, shape (column, row)
-        Places at full scale; of no rows at all when there are none.
+    burnt : int64 array, shape (place, 2)
+        Column and row of each place at full scale.
     displacement_px : float64 array, shape (2, column)
         The present path of each wall.
     support : float64 array, shape (stripe, column)
@@ -32,7 +32,7 @@ class Stretch:
 
     columns: Float32Array
     usable: BoolArray
-    burnt: BoolArray
+    burnt: IntArray
     displacement_px: FloatArray
     support: FloatArray
     tone: Tone = AS_IT_IS
