@@ -29,7 +29,7 @@ from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.learning import Learning, Lesson
 from gramoscope.pickup.texture.reading import Evidence, Model, Rules, read, settled, spaced
 from gramoscope.pickup.texture.sharpness import CELL_PX, sharpness
-from gramoscope.pickup.texture.stretch import Stretch
+from gramoscope.pickup.texture.stretch import Stretch, places_brighter
 from gramoscope.quality import Quality, no_flags
 from gramoscope.signal_path import FrameGroup, Texture, WallTrace
 
@@ -284,7 +284,8 @@ class TexturePickup:
             wanted[:, tiles] = wanted[:, tiles].any(axis=1, keepdims=True)
         laid = overlay(group.usable_images, sight.shift_px, np.flatnonzero(group.valid), wanted)
         usable = laid.frames * 2 >= laid.frames.max()
-        return Stretch(laid.columns, usable, burnt_places(laid, group.white_level), path, support), laid
+        burnt = places_brighter(laid.columns, np.float32(NEARLY_WHITE * group.white_level))
+        return Stretch(laid.columns, usable, burnt, path, support), laid
 
     def models_for(self, number: int) -> list[Model]:
         """Return the models by which a group is read, round by round: none that the group itself has taught."""
@@ -342,11 +343,6 @@ SUPPORT_CELLS = 4.0
 """Smoothing of the support: one cell of texture is a poor witness."""
 UNSEEN = Quality.NO_STRIPE | Quality.INTERPOLATED
 UNTAUGHT = "too little of the stripes is seen to learn their texture; the recipe seed-paper reads single groups"
-
-
-def burnt_places(laid: Overlay, white_level: int) -> IntArray:
-    """Return column and row of what is burnt out, shape (place, 2)."""
-    return np.argwhere(laid.columns >= NEARLY_WHITE * white_level)
 
 
 def samples_of(stretch: Stretch, found: Evidence) -> tuple[FloatArray, FloatArray]:

@@ -27,7 +27,7 @@ from gramoscope.pickup.texture.reading import (
     step,
 )
 from gramoscope.pickup.texture.spectrum import Band
-from gramoscope.pickup.texture.stretch import Stretch
+from gramoscope.pickup.texture.stretch import Stretch, places_brighter
 from gramoscope.pickup.texture.tone import Tone
 
 WIDTH = 800
@@ -171,7 +171,8 @@ def test_columns_that_are_burnt_thin_or_without_stripe_are_not_clear(another: St
     burnt[100:110, row - 4 : row + 4] = True
     burnt[200:210, row - 4] = True
     burnt[300:310, row + 20 :] = True
-    spoilt = np.flatnonzero(~_clear(another, layout, burnt=np.argwhere(burnt)))
+    np.testing.assert_array_equal(places_brighter(burnt.astype(np.float32), np.float32(0.5)), np.argwhere(burnt))
+    spoilt = np.flatnonzero(~_clear(another, layout, burnt=places_brighter(burnt.astype(np.float32), np.float32(0.5))))
     np.testing.assert_array_equal(spoilt, np.arange(100, 110), "one grain is none")
     usable[:40] = False
     np.testing.assert_array_equal(np.flatnonzero(~_clear(another, layout, usable=usable)), np.arange(40))

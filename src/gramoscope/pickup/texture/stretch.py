@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numba
+import numpy as np
+
 from gramoscope.conventions import BoolArray, Float32Array, FloatArray, IntArray
 from gramoscope.pickup.texture.tone import Tone
 
@@ -47,3 +50,26 @@ class Stretch:
     def moved(self, step_px: FloatArray) -> Stretch:
         """Return the same stretch with its paths moved, shape (2, column)."""
         return replace(self, displacement_px=self.displacement_px + step_px)
+
+
+@numba.njit(cache=True, nogil=True)
+def _brighter(column, level):  # type: ignore[no-untyped-def]
+    count = 0
+    for row in range(column.size):
+        count += column[row] >= level
+    return count
+
+
+@numba.njit(cache=True, nogil=True)
+def places_brighter(columns, level):  # type: ignore[no-untyped-def]
+    """Return column and row of all points of a picture, [column, row], that reach a level, shape (place, 2)."""
+    counts = np.empty(len(columns), np.int64)
+    for x in range(len(columns)):
+        counts[x] = _brighter(columns[x], level)
+    places, n = np.empty((counts.sum(), 2), np.int64), 0
+    for seen in np.flatnonzero(counts):
+        for row in range(columns.shape[1]):
+            if columns[seen, row] >= level:
+                places[n, 0], places[n, 1] = seen, row
+                n += 1
+    return places
