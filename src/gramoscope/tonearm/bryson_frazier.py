@@ -22,7 +22,7 @@ from scipy import linalg
 
 from gramoscope.conventions import FloatArray
 from gramoscope.tonearm.linear_gaussian import Filtered, FilterState, Moves, Readings
-from gramoscope.tonearm.small_matrices import STATES, block_sandwich, block_vector, dot, times
+from gramoscope.tonearm.small_matrices import STATES, add_products, block_sandwich, block_vector, dot, times
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,11 +48,12 @@ def _unobserve(h, innovation, spread, gain, nk, r, n):  # type: ignore[no-untype
     knk = times(n, gain, nk)
     e = innovation / spread - dot(gain, r)
     d = 1 / spread + knk
-    size = r.size
-    for i in range(size):
+    for i in range(r.size):
         r[i] += h[i] * e
-        for j in range(size):
-            n[i, j] += h[i] * h[j] * d - h[i] * nk[j] - nk[i] * h[j]
+        # h hᵀ d − h (NK)ᵀ − (NK) hᵀ, in two products
+        nk[i] = 0.5 * h[i] * d - nk[i]
+    add_products(h, nk, n)
+    add_products(nk, h, n)
     return e, d
 
 
@@ -65,14 +66,14 @@ def _far(h, value, variance, m, p, r, n, ph, nph):  # type: ignore[no-untyped-de
 
 
 @numba.njit(cache=True, nogil=True)
-def _smooth(at, model, places, h, value, variance, gate_variance, used, nu, spread, gain, means, covs, want, mean, sigma, off):  # type: ignore  # fmt: skip
+def _smooth(a, at, model, places, h, value, variance, gate_variance, used, nu, spread, gain, means, covs, want, mean, sigma, off):  # type: ignore  # fmt: skip
     size = means.shape[1]
     r, r_before, n, n_before = np.zeros(size), np.zeros(size), np.zeros((size, size)), np.zeros((size, size))
     half, one, two = np.empty((STATES, STATES)), np.empty(size), np.empty(size)
     j = places.size - 1
     for k in range(means.shape[0] - 1, -1, -1):
-        block_vector(at[model[k]], r, r_before)
-        block_sandwich(at[model[k]], n, half, n_before)
+        block_vector(a[model[k]], r, r_before)
+        block_sandwich(at[model[k]], a[model[k]], n, half, n_before)
         r[:], n[:] = r_before, n_before
         last = j
         while j >= 0 and places[j] == k:
@@ -106,7 +107,7 @@ def backward(moves: Moves, readings: Readings, filtered: Filtered, *, wanted: Fl
     shape = (moves.model.size, wanted.shape[0])
     mean, sigma, distance = np.empty(shape), np.empty(shape), np.empty(readings.value.size)
     _smooth(
-        np.ascontiguousarray(moves.a.swapaxes(-1, -2)), moves.model, readings.bin, readings.h, readings.value,
+        moves.a, moves.transposed, moves.model, readings.bin, readings.h, readings.value,
         readings.variance, readings.gate_variance, filtered.used, filtered.innovation, filtered.spread, filtered.gain,
         filtered.mean, filtered.covariance, wanted, mean, sigma, distance,
     )  # fmt: skip

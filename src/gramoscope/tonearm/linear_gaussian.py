@@ -16,7 +16,7 @@ import numba
 import numpy as np
 
 from gramoscope.conventions import BoolArray, FloatArray, IntArray
-from gramoscope.tonearm.small_matrices import STATES, block_sandwich, block_vector, dot, times
+from gramoscope.tonearm.small_matrices import STATES, add_products, block_sandwich, block_vector, dot, times
 
 SOURCES = 2
 FORGIVENESS = 8
@@ -42,6 +42,11 @@ class Moves:
     q: FloatArray
     model: IntArray
     agitation: FloatArray
+
+    @property
+    def transposed(self) -> FloatArray:
+        """Aᵀ."""
+        return np.ascontiguousarray(self.a.swapaxes(-1, -2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,9 +160,9 @@ class Filtered:
 
 
 @numba.njit(cache=True, nogil=True)
-def _move(a, q, agitation, m, p, half, m_out, p_out):  # type: ignore[no-untyped-def]
-    block_vector(a, m, m_out)
-    block_sandwich(a, p, half, p_out)
+def _move(a, at, q, agitation, m, p, half, m_out, p_out):  # type: ignore[no-untyped-def]
+    block_vector(at, m, m_out)
+    block_sandwich(a, at, p, half, p_out)
     for b in range(a.shape[0]):
         for i in range(STATES):
             for j in range(STATES):
@@ -165,16 +170,13 @@ def _move(a, q, agitation, m, p, half, m_out, p_out):  # type: ignore[no-untyped
 
 
 @numba.njit(cache=True, nogil=True)
-def _observe(innovation, spread, gain, m, p):  # type: ignore[no-untyped-def]
+def _observe(innovation, spread, gain, less, m, p):  # type: ignore[no-untyped-def]
     """Update mean and covariance in place, `gain` being ph on the way in and K on the way out."""
-    size = m.size
-    for i in range(size):
+    for i in range(m.size):
+        less[i] = -gain[i]
         gain[i] /= spread
         m[i] += gain[i] * innovation
-    for i in range(size):
-        w = gain[i] * spread
-        for j in range(size):
-            p[i, j] -= w * gain[j]
+    add_products(less, gain, p)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -192,9 +194,9 @@ def _judge(used, source, missed, since):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _filter(a, q, model, agitation, places, source, h, value, variance, gate_variance, rule, allowed, lost, m, p, missed, since, means, covs, misses, sinces, used, nu, spread, gain):  # type: ignore  # fmt: skip  # noqa: E501
+def _filter(a, at, q, model, agitation, places, source, h, value, variance, gate_variance, rule, allowed, lost, m, p, missed, since, means, covs, misses, sinces, used, nu, spread, gain):  # type: ignore  # fmt: skip  # noqa: E501
     width, patience, anywhere, doubt = rule
-    half, m_next, p_next = np.empty((STATES, STATES)), np.empty_like(m), np.empty_like(p)
+    half, less, m_next, p_next = np.empty((STATES, STATES)), np.empty_like(m), np.empty_like(m), np.empty_like(p)
     loglik = 0.0
     j = 0
     for k in range(means.shape[0]):
@@ -217,9 +219,9 @@ def _filter(a, q, model, agitation, places, source, h, value, variance, gate_var
                 loglik -= 0.5 * (LOG_2PI + np.log(spread[j]) + distance)
                 _judge(used[j], source[j], missed, since)
             if used[j]:
-                _observe(nu[j], spread[j], gain[j], m, p)
+                _observe(nu[j], spread[j], gain[j], less, m, p)
             j += 1
-        _move(a[model[k]], q[model[k]], agitation[k], m, p, half, m_next, p_next)
+        _move(a[model[k]], at[model[k]], q[model[k]], agitation[k], m, p, half, m_next, p_next)
         m[:], p[:] = m_next, p_next
     return loglik
 
@@ -260,7 +262,7 @@ def forward(
     lost = np.zeros(bins, np.bool_) if lost is None else lost.copy()
     rule = gate or Gate()
     loglik = _filter(
-        moves.a, moves.q, moves.model, moves.agitation, readings.bin, readings.source, readings.h, readings.value,
+        moves.a, moves.transposed, moves.q, moves.model, moves.agitation, readings.bin, readings.source, readings.h, readings.value,
         readings.variance, readings.gate_variance, (rule.width, rule.patience, rule.anywhere, rule.doubt), may, lost,
         begin.mean.copy(), begin.covariance.copy(), begin.missed.copy(), begin.since.copy(), means, covs, misses,
         sinces, used, nu, spread, gain,

@@ -21,7 +21,7 @@ LOG_2PI = float(np.log(2 * np.pi))
 
 
 @numba.njit(cache=True, nogil=True)
-def _log_likelihood(a, q, covariance, bin_, value, variance, h, width):  # type: ignore[no-untyped-def]
+def _log_likelihood(a, at, q, covariance, bin_, value, variance, h, width):  # type: ignore[no-untyped-def]
     states = h.size
     m, m_next, gain, gain_before = np.zeros(states), np.zeros(states), np.zeros(states), np.zeros(states)
     p, p_next, half = covariance.copy(), np.empty_like(covariance), np.empty((a.shape[1], a.shape[1]))
@@ -48,7 +48,7 @@ def _log_likelihood(a, q, covariance, bin_, value, variance, h, width):  # type:
         if k + 1 == bin_.size:
             break
         if settled and used and bin_[k + 1] == bin_[k] + 1:
-            block_vector(a, m, m_next)
+            block_vector(at, m, m_next)
             m[:] = m_next
         else:
             # a rejected reading leaves more doubt than is usual
@@ -58,8 +58,8 @@ def _log_likelihood(a, q, covariance, bin_, value, variance, h, width):  # type:
                     for j in range(states):
                         p[i, j] -= gain[i] * spread * gain[j]
             for _ in range(bin_[k + 1] - bin_[k]):
-                block_vector(a, m, m_next)
-                block_sandwich(a, p, half, p_next)
+                block_vector(at, m, m_next)
+                block_sandwich(a, at, p, half, p_next)
                 m[:], p[:] = m_next, p_next + q
     return total
 
@@ -91,4 +91,6 @@ def steady_log_likelihood(
     gate : float
         A reading further than this many standard deviations from its prediction is rejected, and counts as if it lay there.
     """
-    return float(_log_likelihood(a[None], q, covariance, bin_, value, variance, h, gate))
+    return float(
+        _log_likelihood(a[None], np.ascontiguousarray(a.T)[None], q, covariance, bin_, value, variance, h, gate)
+    )
