@@ -164,21 +164,18 @@ class Followed:
     smoothed : Smoothed
         Slopes of both directions, times the step.
     accepted : bool array, shape (reading,)
-    first, last : Filtered
-        The passes.
+    state : PassState
+        Where to go on.
     """
 
     smoothed: Smoothed
     accepted: BoolArray
-    first: Filtered
-    last: Filtered
-
-    def state(self, first_bin: int, bin_: int) -> PassState:
-        """Return where to go on at a bin; `first_bin` is where the passes began."""
-        return PassState(bin_, self.first.state(bin_ - first_bin), self.last.state(bin_ - first_bin))
+    state: PassState
 
 
-def robustly(steps: Moves, readings: Readings, trusted: BoolArray, begin: PassState, *, gate: float) -> Followed:
+def robustly(
+    steps: Moves, readings: Readings, trusted: BoolArray, begin: PassState, *, gate: float, resume_bin: int
+) -> Followed:
     """Smooth the groove by readings some of which are wild.
 
     Parameters
@@ -190,23 +187,35 @@ def robustly(steps: Moves, readings: Readings, trusted: BoolArray, begin: PassSt
     begin : PassState
     gate : float
         Standard deviations.
+    resume_bin : int
+        Where to go on later, counted as `begin.bin` is.
 
     Returns
     -------
     Followed
     """
+    resume = resume_bin - begin.bin
     rule = Gate(gate, PATIENCE, ANYWHERE_M, DOUBT)
-    first = forward(steps, readings, begin.first, gate=rule, allowed=trusted)
-    accepted = backward(steps, readings, first, wanted=SLOPES[:0]).distance <= gate
+    first = forward(steps, readings, begin.first, gate=rule, allowed=trusted, resume=resume)
+    accepted = backward(steps, readings, first).distance <= gate
     lost, missed = _where_it_was_lost(first, readings)
     accepted |= missed & trusted
     for _ in range(ROUNDS):
-        last = forward(steps, readings, begin.last, gate=Gate(anywhere=ANYWHERE_M), allowed=accepted, lost=lost)
-        smoothed = backward(steps, readings, last, wanted=SLOPES)
+        last = forward(
+            steps,
+            readings,
+            begin.last,
+            gate=Gate(anywhere=ANYWHERE_M),
+            allowed=accepted,
+            lost=lost,
+            wanted=SLOPES,
+            resume=resume,
+        )
+        smoothed = backward(steps, readings, last)
         used, accepted = accepted, smoothed.distance <= gate
         if np.array_equal(used, accepted):
             break
-    return Followed(smoothed, used, first, last)
+    return Followed(smoothed, used, PassState(resume_bin, first.resume, last.resume))
 
 
 def _where_it_was_lost(first: Filtered, readings: Readings) -> tuple[BoolArray, BoolArray]:
@@ -259,7 +268,7 @@ def _surprise(found: Filtered, readings: Readings, trusted: BoolArray) -> tuple[
     one = np.flatnonzero((readings.bin[1:] == readings.bin[:-1]) & trusted[1:] & trusted[:-1])
     h, bins = readings.h, readings.bin
     away = readings.value - np.einsum("ij,ij->i", h, found.mean[bins])
-    spread = np.einsum("ij,ijk,ik->i", h, found.covariance[bins], h) + readings.variance
+    spread = found.expected + readings.variance
     apart = np.minimum((away[one] - away[one + 1]) ** 2, (away[one] + away[one + 1]) ** 2)
     agree = apart < AGREEMENT * (readings.variance[one] + readings.variance[one + 1])
     share = away**2 / spread

@@ -96,7 +96,9 @@ def _counted_from_the_first(one: OneDirection) -> tuple[IntArray, FloatArray, Fl
     return known - known[0], place - place[0], one.variance[known]
 
 
-def learn(given: Lessons | None, step_m: float, limits: PriorLimits, *, before: GroovePrior | None = None) -> GroovePrior:
+def learn(
+    given: Lessons | None, step_m: float, limits: PriorLimits, *, before: GroovePrior | None = None
+) -> GroovePrior:
     """Return the prior under which the stretches are most likely.
 
     Parameters

@@ -167,6 +167,7 @@ class _PlaceFollower:
             ~fresh.suspect,
             state,
             gate=self.smoother.gate,
+            resume_bin=min(stop, end - 1),
         )
         flags = samples.flags.copy()
         flags[measured[~followed.accepted]] |= OUTLIER
@@ -181,7 +182,7 @@ class _PlaceFollower:
         )
         # outliers stay outliers when the next block looks at them again
         settled = samples.flagged(np.where(samples.bin < stop, flags, samples.flags)).part(samples.bin >= stop - 2)
-        return motion, followed.state(state.bin, min(stop, end - 1)), settled
+        return motion, followed.state, settled
 
     def _motion(
         self,

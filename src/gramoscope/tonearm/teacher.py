@@ -135,6 +135,7 @@ class Teacher:
             ~fresh.suspect,
             beginning(model, first),
             gate=self.gate,
+            resume_bin=first,
         )
         suspect = samples.suspect.copy()
         suspect[measured] = ~followed.accepted
