@@ -43,25 +43,25 @@ class Smoothed:
 
 
 @numba.njit(cache=True, nogil=True)
-def _unobserve(h, innovation, spread, gain, nk, r, n):  # type: ignore[no-untyped-def]
+def _unobserve(h, j, innovation, spread, gain, nk, r, n):  # type: ignore[no-untyped-def]
     """Take one used reading into r and N; return its e and D."""
-    knk = times(n, gain, nk)
-    e = innovation / spread - dot(gain, r)
+    knk = times(n, gain, j, nk)
+    e = innovation / spread - dot(gain, j, r, 0, r.size)
     d = 1 / spread + knk
     for i in range(r.size):
-        r[i] += h[i] * e
+        r[i] += h[j, i] * e
         # h hᵀ d − h (NK)ᵀ − (NK) hᵀ, in two products
-        nk[i] = 0.5 * h[i] * d - nk[i]
-    add_products(h, nk, n)
-    add_products(nk, h, n)
+        nk[i] = 0.5 * h[j, i] * d - nk[i]
+    add_products(h, j, nk, 0, n)
+    add_products(nk, 0, h, j, n)
     return e, d
 
 
 @numba.njit(cache=True, nogil=True)
-def _far(away, ph, expected, variance, r, n, nph):  # type: ignore[no-untyped-def]
+def _far(away, ph, j, expected, variance, r, n, nph):  # type: ignore[no-untyped-def]
     """How many standard deviations an unused reading lies from the smoothed state."""
-    spread = max(expected - times(n, ph, nph), 0.0) + variance
-    return abs(away - dot(ph, r)) / np.sqrt(spread)
+    spread = max(expected - times(n, ph, j, nph), 0.0) + variance
+    return abs(away - dot(ph, j, r, 0, r.size)) / np.sqrt(spread)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -73,22 +73,24 @@ def _smooth(a, at, model, places, h, value, variance, gate_variance, used, nu, s
     for k in range(means.shape[0] - 1, -1, -1):
         r, r_next = r_next, r
         n, n_next = n_next, n
-        block_vector(a[model[k]], r_next, r)
-        block_sandwich(at[model[k]], a[model[k]], n_next, half, n)
+        block_vector(a, size * model[k], r_next, r)
+        block_sandwich(at, a, size * model[k], n_next, half, n)
         last = j
         while j >= 0 and places[j] == k:
             if used[j]:
-                e, d = _unobserve(h[j], nu[j], spread[j], gain[j], one, r, n)
+                e, d = _unobserve(h, j, nu[j], spread[j], gain, one, r, n)
                 off[j] = abs(e / d) / np.sqrt(1 / d + gate_variance[j] - variance[j])
             j -= 1
         for i in range(j + 1, last + 1):
             if not used[i]:
-                away = value[i] - dot(h[i], means[k])
-                off[i] = _far(away, gain[i], expected[i], gate_variance[i], r, n, one)
+                away = value[i] - dot(h, i, means, k, size)
+                off[i] = _far(away, gain, i, expected[i], gate_variance[i], r, n, one)
         for i in range(want.shape[0]):
-            mean[k, i] = dot(want[i], means[k]) + dot(toward[k, i], r)
-            less = times(n, toward[k, i], one)
-            sigma[k, i] = np.sqrt(max(dot(want[i], toward[k, i]) - less, 0.0))
+            # row of `toward`
+            there = k * want.shape[0] + i
+            mean[k, i] = dot(want, i, means, k, size) + dot(toward, there, r, 0, size)
+            less = times(n, toward, there, one)
+            sigma[k, i] = np.sqrt(max(dot(want, i, toward, there, size) - less, 0.0))
 
 
 def backward(moves: Moves, readings: Readings, filtered: Filtered) -> Smoothed:
@@ -107,9 +109,9 @@ def backward(moves: Moves, readings: Readings, filtered: Filtered) -> Smoothed:
     shape = filtered.toward.shape[:2]
     mean, sigma, distance = np.empty(shape), np.empty(shape), np.empty(readings.value.size)
     _smooth(
-        moves.a, moves.transposed, moves.model, readings.bin, readings.h, readings.value, readings.variance,
+        *moves.stacked[:2], moves.model, readings.bin, readings.h, readings.value, readings.variance,
         readings.gate_variance, filtered.used, filtered.innovation, filtered.spread, filtered.gain, filtered.expected,
-        filtered.mean, filtered.wanted, filtered.toward, mean, sigma, distance,
+        filtered.mean, filtered.wanted, filtered.toward.reshape(-1, filtered.mean.shape[1]), mean, sigma, distance,
     )  # fmt: skip
     return Smoothed(mean, sigma, distance)
 

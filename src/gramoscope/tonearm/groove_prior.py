@@ -165,11 +165,11 @@ def _series(f, noise, a, q):  # type: ignore[no-untyped-def]
     a[:] = power
     q[:] = change
     for n in range(1, TERMS):
-        multiply(f, power, one)
+        multiply(f, 0, 0, power, 0, 0, one, 0, 0)
         power[:] = one / n
         a += power
-        multiply(f, change, one)
-        transpose(one, two)
+        multiply(f, 0, 0, change, 0, 0, one, 0, 0)
+        transpose(one, 0, 0, two, 0, 0)
         change[:] = (one + two) / (n + 1)
         q += change
 
@@ -185,11 +185,11 @@ def _one_step(f, noise):  # type: ignore[no-untyped-def]
     a, q, one, two = np.empty_like(f), np.empty_like(f), np.empty_like(f), np.empty_like(f)
     _series(f * share, noise * share, a, q)
     for _ in range(halvings):
-        multiply(a, q, one)
-        transpose(a, two)
-        multiply(one, two, one)
+        multiply(a, 0, 0, q, 0, 0, one, 0, 0)
+        transpose(a, 0, 0, two, 0, 0)
+        multiply(one, 0, 0, two, 0, 0, one, 0, 0)
         q += one
-        multiply(a, a, two)
+        multiply(a, 0, 0, a, 0, 0, two, 0, 0)
         a[:] = two
     return a, q
 

@@ -44,9 +44,10 @@ class Moves:
     agitation: FloatArray
 
     @property
-    def transposed(self) -> FloatArray:
-        """Aᵀ."""
-        return np.ascontiguousarray(self.a.swapaxes(-1, -2))
+    def stacked(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """All blocks of A, Aᵀ and Q one below the other, shape (model · block · n, n)."""
+        a, at, q = (blocks.reshape(-1, STATES) for blocks in (self.a, self.a.swapaxes(-1, -2), self.q))
+        return np.ascontiguousarray(a), np.ascontiguousarray(at), np.ascontiguousarray(q)
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,25 +167,24 @@ class Filtered:
 
 
 @numba.njit(cache=True, nogil=True)
-def _move(a, at, q, agitation, m, p, half, m_out, p_out):  # type: ignore[no-untyped-def]
-    block_vector(at, m, m_out)
-    block_sandwich(a, at, p, half, p_out)
-    for b in range(a.shape[0]):
-        first = b * STATES
-        for i in range(STATES):
+def _move(a, at, q, first, agitation, m, p, half, m_out, p_out):  # type: ignore[no-untyped-def]
+    block_vector(at, first, m, m_out)
+    block_sandwich(a, at, first, p, half, p_out)
+    for b in range(0, m.size, STATES):
+        for i in range(b, b + STATES):
             for j in range(STATES):
-                p_out[first + i, first + j] += agitation * q[b, i, j]
+                p_out[i, b + j] += agitation * q[first + i, j]
 
 
 @numba.njit(cache=True, nogil=True)
-def _observe(innovation, spread, ph, gain, m, p):  # type: ignore[no-untyped-def]
+def _observe(innovation, spread, ph, gain, j, m, p):  # type: ignore[no-untyped-def]
     """Update mean and covariance in place and write K."""
     for i in range(m.size):
-        gain[i] = -ph[i] / spread
-    add_products(ph, gain, p)
+        gain[j, i] = -ph[i] / spread
+    add_products(ph, 0, gain, j, p)
     for i in range(m.size):
-        gain[i] = -gain[i]
-        m[i] += gain[i] * innovation
+        gain[j, i] = -gain[j, i]
+        m[i] += gain[j, i] * innovation
 
 
 @numba.njit(cache=True, nogil=True)
@@ -202,14 +202,29 @@ def _judge(used, source, missed, since):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _before_others(h, ph, used, spread, gain):  # type: ignore[no-untyped-def]
-    """Take ph back to before the earlier readings of a bin, whose gains are given; return by how much hᵀph grows."""
+def _count(missed, since, patience, misses, sinces, k):  # type: ignore[no-untyped-def]
+    """Write down what was missed up to a bin and count it; return whether patience is at an end, and begin again then."""
+    lost = False
+    for i in range(SOURCES):
+        misses[k, i], sinces[k, i] = missed[i], since[i]
+        lost = lost or missed[i] >= patience
+    for i in range(SOURCES):
+        if lost:
+            missed[i], since[i] = 0, 0
+        elif missed[i] > 0:
+            since[i] += 1
+    return lost
+
+
+@numba.njit(cache=True, nogil=True)
+def _before_others(h, j, ph, first, used, spread, gain):  # type: ignore[no-untyped-def]
+    """Take ph back to before the readings from the first of a bin up to j; return by how much hᵀph grows."""
     more = 0.0
-    for i in range(used.size):
+    for i in range(first, j):
         if used[i]:
-            share = dot(gain[i], h)
+            share = dot(gain, i, h, j, ph.size)
             more += spread[i] * share**2
-            for n in range(h.size):
+            for n in range(ph.size):
                 ph[n] += spread[i] * share * gain[i, n]
     return more
 
@@ -217,40 +232,39 @@ def _before_others(h, ph, used, spread, gain):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True, nogil=True)
 def _filter(a, at, q, model, agitation, places, source, h, value, variance, gate_variance, rule, allowed, lost, m, p, missed, since, want, means, toward, misses, sinces, used, nu, spread, gain, expected, resume, m_resume, p_resume):  # type: ignore  # fmt: skip  # noqa: E501
     width, patience, anywhere, doubt = rule
+    size = m.size
     half, ph, m_next, p_next = np.empty((STATES, STATES)), np.empty_like(m), np.empty_like(m), np.empty_like(p)
     loglik = 0.0
     j = 0
     for k in range(means.shape[0]):
-        misses[k], sinces[k] = missed, since
-        if missed.max() >= patience:
-            lost[k] = True
-            missed[:] = 0
-            since[:] = 0
+        lost[k] |= _count(missed, since, patience, misses, sinces, k)
         if lost[k]:
             _lose(p, anywhere, doubt)
-        means[k] = m
+        for i in range(size):
+            means[k, i] = m[i]
         for i in range(want.shape[0]):
-            times(p, want[i], toward[k, i])
+            times(p, want, i, ph)
+            for n in range(size):
+                toward[k, i, n] = ph[n]
         if k == resume:
             m_resume[:], p_resume[:] = m, p
-        since += missed > 0
         first = j
         while j < places.size and places[j] == k:
-            seen = times(p, h[j], ph)
-            nu[j], spread[j] = value[j] - dot(h[j], m), seen + variance[j]
+            seen = times(p, h, j, ph)
+            nu[j], spread[j] = value[j] - dot(h, j, m, 0, size), seen + variance[j]
             if allowed[j]:
                 used[j] = nu[j] ** 2 <= width**2 * (seen + gate_variance[j])
                 distance = nu[j] ** 2 / spread[j] if used[j] else width**2
                 loglik -= 0.5 * (LOG_2PI + np.log(spread[j]) + distance)
                 _judge(used[j], source[j], missed, since)
             if used[j]:
-                _observe(nu[j], spread[j], ph, gain[j], m, p)
-            more = _before_others(h[j], ph, used[first:j], spread[first:j], gain[first:j])
-            expected[j] = seen + more
+                _observe(nu[j], spread[j], ph, gain, j, m, p)
+            expected[j] = seen + _before_others(h, j, ph, first, used, spread, gain)
             if not used[j]:
-                gain[j] = ph
+                for i in range(size):
+                    gain[j, i] = ph[i]
             j += 1
-        _move(a[model[k]], at[model[k]], q[model[k]], agitation[k], m, p, half, m_next, p_next)
+        _move(a, at, q, size * model[k], agitation[k], m, p, half, m_next, p_next)
         m, m_next = m_next, m
         p, p_next = p_next, p
     return loglik
@@ -300,7 +314,7 @@ def forward(
     rule = gate or Gate()
     m_resume, p_resume = np.empty(size), np.empty((size, size))
     loglik = _filter(
-        moves.a, moves.transposed, moves.q, moves.model, moves.agitation, readings.bin, readings.source, readings.h,
+        *moves.stacked, moves.model, moves.agitation, readings.bin, readings.source, readings.h,
         readings.value, readings.variance, readings.gate_variance,
         (rule.width, rule.patience, rule.anywhere, rule.doubt), may, lost,
         begin.mean.copy(), begin.covariance.copy(), begin.missed.copy(), begin.since.copy(), want, means, toward,

@@ -1,61 +1,63 @@
-"""Products of small matrices, for a state of blocks that all have one size."""
+"""Products of small matrices, for a state of blocks that all have one size.
+
+Vectors are rows of arrays, given by their number (see `tonearm.vector_rows`). Block diagonal matrices are given as their blocks
+one below the other, from a row on.
+"""
 
 from __future__ import annotations
 
 import numba
 
-from gramoscope.tonearm.vector_rows import STATES, add_outer, add_row_times, mirror, multiply, transpose
+from gramoscope.tonearm.vector_rows import STATES, add_outer, add_row_times, inner, mirror, multiply, transpose
 
 __all__ = ["STATES", "add_products", "block_sandwich", "block_vector", "dot", "times"]
 
 
 @numba.njit(cache=True, nogil=True)
-def block_sandwich(a, at, x, half, out):  # type: ignore[no-untyped-def]
-    """Write A x Aᵀ for symmetric x and a block diagonal A, given as its blocks and as theirs, transposed."""
-    for b in range(a.shape[0]):
-        row = slice(b * STATES, (b + 1) * STATES)
-        for c in range(b + 1):
-            column = slice(c * STATES, (c + 1) * STATES)
-            here = out[row, column]
-            multiply(a[b], x[row, column], half)
-            multiply(half, at[c], here)
+def block_sandwich(a, at, first, x, half, out):  # type: ignore[no-untyped-def]
+    """Write A x Aᵀ for symmetric x and a block diagonal A, given with its transpose."""
+    for b in range(0, x.shape[0], STATES):
+        for c in range(0, b + 1, STATES):
+            multiply(a, first + b, 0, x, b, c, half, 0, 0)
+            multiply(half, 0, 0, at, first + c, 0, out, b, c)
             if b == c:
-                mirror(here)
+                mirror(out, b, b)
             else:
-                transpose(here, out[column, row])
+                transpose(out, b, c, out, c, b)
 
 
 @numba.njit(cache=True, nogil=True)
-def block_vector(at, x, out):  # type: ignore[no-untyped-def]
-    """Write A x for a block diagonal A, given as its blocks, transposed."""
-    out[:] = 0.0
-    for b in range(at.shape[0]):
-        row = slice(b * STATES, (b + 1) * STATES)
-        add_row_times(x[row], at[b], out[row])
+def block_vector(at, first, x, out):  # type: ignore[no-untyped-def]
+    """Write A x for a block diagonal A whose transpose is given, and vectors that are arrays by themselves."""
+    for i in range(x.size):
+        out[i] = 0.0
+    for b in range(0, x.size, STATES):
+        add_row_times(x, 0, b, at, first + b, 0, out, 0, b)
 
 
 @numba.njit(cache=True, nogil=True)
-def dot(x, y):  # type: ignore[no-untyped-def]
+def dot(x, i, y, j, size):  # type: ignore[no-untyped-def]
     """Return x·y."""
     total = 0.0
-    for i in range(x.size):
-        total += x[i] * y[i]
+    for b in range(0, size, STATES):
+        total += inner(x, i, b, y, j, b)
     return total
 
 
 @numba.njit(cache=True, nogil=True)
-def times(p, h, out):  # type: ignore[no-untyped-def]
+def times(p, h, j, out):  # type: ignore[no-untyped-def]
     """Write p h for symmetric p and return hᵀ p h."""
-    out[:] = 0.0
-    for b in range(0, h.size, STATES):
-        for c in range(0, h.size, STATES):
-            add_row_times(h[b : b + STATES], p[b : b + STATES, c : c + STATES], out[c : c + STATES])
-    return dot(h, out)
+    for i in range(out.size):
+        out[i] = 0.0
+    for b in range(0, out.size, STATES):
+        for c in range(0, out.size, STATES):
+            add_row_times(h, j, b, p, b, c, out, 0, c)
+    return dot(h, j, out, 0, out.size)
 
 
 @numba.njit(cache=True, nogil=True)
-def add_products(x, y, p):  # type: ignore[no-untyped-def]
+def add_products(x, i, y, j, p):  # type: ignore[no-untyped-def]
     """Add x yᵀ to p."""
-    for b in range(0, x.size, STATES):
-        for c in range(0, x.size, STATES):
-            add_outer(x[b : b + STATES], y[c : c + STATES], p[b : b + STATES, c : c + STATES])
+    for b in range(0, p.shape[0], STATES):
+        for c in range(0, p.shape[0], STATES):
+            add_outer(x, i, b, y, j, c, p, b, c)

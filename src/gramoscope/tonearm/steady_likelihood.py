@@ -75,29 +75,32 @@ def _of_one(a, at, q, p, bin_, value, variance, width):  # type: ignore[no-untyp
         if k + 1 == bin_.size:
             break
         if settled and used and bin_[k + 1] == bin_[k] + 1:
-            block_vector(at, m, m_next)
-            m[:] = m_next
+            block_vector(at, 0, m, m_next)
+            m, m_next = m_next, m
         else:
             # a rejected reading leaves more doubt than is usual
             settled, calm = False, calm if used else 0
             if used:
                 for i in range(STATES):
                     less[i] = -gain[i] * spread
-                add_products(less, gain, p)
+                add_products(less, 0, gain, 0, p)
             for _ in range(bin_[k + 1] - bin_[k]):
-                block_vector(at, m, m_next)
-                block_sandwich(a, at, p, half, p_next)
-                m[:], p[:] = m_next, p_next + q
+                block_vector(at, 0, m, m_next)
+                block_sandwich(a, at, 0, p, half, p_next)
+                m, m_next = m_next, m
+                p, p_next = p_next, p
+                for i in range(STATES):
+                    for j in range(STATES):
+                        p[i, j] += q[i, j]
     return total
 
 
 @numba.njit(cache=True, nogil=True)
 def _of_all(a, at, q, at_rest, place_sigma_m, sigma, begin, bin_, value, variance, width):  # type: ignore[no-untyped-def]
     total = 0.0
-    p = np.zeros((STATES, STATES))
     for i in range(sigma.size):
         here = slice(begin[i], begin[i + 1])
-        p[:] = 0.0
+        p = np.zeros((STATES, STATES))
         p[0, 0] = place_sigma_m**2
         p[1:, 1:] = sigma[i] ** 2 * at_rest
         total += _of_one(a, at, sigma[i] ** 2 * q, p, bin_[here], value[here], variance[here], width)
@@ -132,7 +135,7 @@ def steady_log_likelihood(
     a, q = steps
     return float(
         _of_all(
-            a[None], np.ascontiguousarray(a.T)[None], q, at_rest, place_sigma_m, sigma, readings.begin, readings.bin,
+            a, np.ascontiguousarray(a.T), q, at_rest, place_sigma_m, sigma, readings.begin, readings.bin,
             readings.value, readings.variance, gate,
         )
     )  # fmt: skip
