@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+import numba
 import numpy as np
 
 from gramoscope.conventions import BoolArray, FloatArray, IntArray
@@ -128,16 +129,17 @@ def which(models: Sequence[GrooveModel], bins: IntArray) -> IntArray:
     return np.maximum(np.searchsorted(starts, bins, side="right") - 1, 0)
 
 
-def moves(models: Sequence[GrooveModel], bins: IntArray) -> Moves:
-    """Return how the state moves from each bin to the next."""
-    here = which(models, bins)
-    agitation = np.ones(bins.size)
-    for number in np.unique(here):
-        model = models[number]
-        mine = np.flatnonzero(
-            (here == number) & (bins >= model.from_bin) & (bins < model.from_bin + model.agitation.size)
-        )
-        agitation[mine] = model.agitation[bins[mine] - model.from_bin]
+def moves(models: Sequence[GrooveModel], first_bin: int, stop_bin: int) -> Moves:
+    """Return how the state moves from each bin, first … stop − 1, to the next."""
+    here = which(models, np.arange(first_bin, stop_bin))
+    agitation = np.ones(here.size)
+    limits = np.searchsorted(here, np.arange(len(models) + 1)) + first_bin
+    for model, begin, end in zip(models, limits[:-1], limits[1:], strict=True):
+        begin, end = max(begin, model.from_bin), min(end, model.from_bin + model.agitation.size)
+        if begin < end:
+            agitation[begin - first_bin : end - first_bin] = model.agitation[
+                begin - model.from_bin : end - model.from_bin
+            ]
     return Moves(np.stack([m.a for m in models]), np.stack([m.q for m in models]), here, agitation)
 
 
@@ -252,7 +254,7 @@ def agitation(model: GrooveModel, readings: Readings, trusted: BoolArray) -> Flo
     factor = np.ones(bins)
     for _ in range(AGITATION_ROUNDS):
         restless = replace(model, from_bin=0, agitation=factor)
-        found = forward(moves([restless], np.arange(bins)), readings, blank(model.covariance), allowed=trusted)
+        found = forward(moves([restless], 0, bins), readings, blank(model.covariance), allowed=trusted)
         excess = _excess(*_surprise(found, readings, trusted), bins)
         if not (excess > 1).any():
             break
@@ -275,16 +277,17 @@ def _surprise(found: Filtered, readings: Readings, trusted: BoolArray) -> tuple[
     return bins[one], np.where(agree, np.minimum(share[one], share[one + 1]), 0.0)
 
 
-def _excess(bins: IntArray, surprise: FloatArray, size: int) -> FloatArray:
+@numba.njit(cache=True, nogil=True)
+def _excess(bins, surprise, size):  # type: ignore[no-untyped-def]
     """The median of the surprise about each bin, over that of a normal number, if it is large; else 1."""
     excess = np.ones(size)
     if np.count_nonzero(surprise > AGITATED * NORMAL_MEDIAN) < AGITATION_BINS // 4:
         return excess
     for first in range(0, size, AGITATION_BINS // 2):
-        near = surprise[(bins >= first) & (bins < first + AGITATION_BINS)]
+        near = surprise[np.searchsorted(bins, first) : np.searchsorted(bins, first + AGITATION_BINS)]
         if near.size >= AGITATION_BINS // 2:
-            ratio = float(np.median(near)) / NORMAL_MEDIAN
+            ratio = np.median(near) / NORMAL_MEDIAN
             if ratio > AGITATED:
-                here = excess[first : first + AGITATION_BINS]
-                np.maximum(here, ratio, out=here)
+                for k in range(first, min(first + AGITATION_BINS, size)):
+                    excess[k] = max(excess[k], ratio)
     return excess

@@ -23,7 +23,6 @@ Q ← Q + A Q Aᵀ, A ← A² as often as needed.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import factorial
 
 import numba
 import numpy as np
@@ -194,7 +193,8 @@ def _one_step(f, noise):  # type: ignore[no-untyped-def]
     return a, q
 
 
-def taylor(fraction: FloatArray) -> FloatArray:
+@numba.njit(cache=True, nogil=True)
+def taylor(fraction):  # type: ignore[no-untyped-def]
     """Return the rows that take the state to the place a fraction of a step away.
 
     Parameters
@@ -207,5 +207,12 @@ def taylor(fraction: FloatArray) -> FloatArray:
     float64 array, shape (reading, 8)
         Of u four terms of the series count, of v three.
     """
-    powers = [fraction**i / factorial(i) for i in range(WIDE + 1)]
-    return np.stack([*powers[:WIDE], *powers[1 : 1 + WIDE_POLES]], axis=-1)
+    out = np.zeros((fraction.size, STATES))
+    for j in range(fraction.size):
+        power = 1.0
+        for i in range(WIDE):
+            out[j, i] = power
+            if 0 < i <= WIDE_POLES:
+                out[j, ORDER + i] = power
+            power *= fraction[j] / (i + 1)
+    return out

@@ -162,7 +162,7 @@ class _PlaceFollower:
         measured = samples.measured(state.bin, end)
         fresh = samples.part(measured)
         followed = robustly(
-            moves(models, np.arange(state.bin, end)),
+            moves(models, state.bin, end),
             fresh.readings(first_bin=state.bin, step_m=self.step_m, gains=self.course.gains),
             ~fresh.suspect,
             state,

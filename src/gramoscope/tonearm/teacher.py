@@ -130,7 +130,7 @@ class Teacher:
         measured = samples.measured(first, stop)
         fresh = samples.part(measured)
         followed = robustly(
-            moves([model], np.arange(first, stop)),
+            moves([model], first, stop),
             fresh.readings(first_bin=first, step_m=self.step_m, gains=self.course.gains),
             ~fresh.suspect,
             beginning(model, first),
