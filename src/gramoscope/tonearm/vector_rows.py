@@ -13,7 +13,6 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic
 
 STATES = 8
@@ -24,6 +23,8 @@ _ANY = ir.Constant(_ROW, ir.Undefined)
 _EACH = range(STATES)
 Value = Any
 """Of LLVM, in the making."""
+_compiled: Any = intrinsic
+"""Numba's own types count the context, which only the compiler gives, as an argument."""
 
 
 class _Writer:
@@ -35,7 +36,7 @@ class _Writer:
         for i in range(0, len(arguments), 3):
             array = context.make_array(signature.args[i])(context, builder, arguments[i])
             row, column = (context.cast(builder, arguments[i + k], signature.args[i + k], types.intp) for k in (1, 2))
-            stride = cgutils.unpack_tuple(builder, array.strides)[0]
+            stride = builder.extract_value(array.strides, 0)
             first = builder.add(builder.mul(row, stride), builder.mul(column, ir.Constant(_LONG, 8)))
             begin = builder.gep(builder.bitcast(array.data, ir.IntType(8).as_pointer()), [first])
             self._matrices.append((begin, stride))
@@ -64,7 +65,7 @@ class _Writer:
     def times_and(self, one: Value, other: Value, more: Value) -> Value:
         """The product of two rows, and one more row added."""
         kind = ir.FunctionType(_ROW, [_ROW] * 3)
-        call = cgutils.get_or_insert_function(self.builder.module, kind, f"llvm.fmuladd.v{STATES}f64")
+        call = self.builder.module.declare_intrinsic(f"llvm.fmuladd.v{STATES}f64", fnty=kind)
         return self.builder.call(call, [one, other, more])
 
     def transposed(self, rows: list[Value]) -> list[Value]:
@@ -133,37 +134,37 @@ def _symmetry(write: _Writer) -> None:
         write.store(write.choose(rows[i], column, [j if j <= i else STATES + j for j in _EACH]), 0, i)
 
 
-@intrinsic
+@_compiled
 def multiply(_, a, a_row, a_column, x, x_row, x_column, out, row, column):  # type: ignore[no-untyped-def]
     """Write a x; the result may lie where a does."""
     return _function(types.void, (a, a_row, a_column, x, x_row, x_column, out, row, column), _matrix_product)
 
 
-@intrinsic
+@_compiled
 def add_row_times(_, h, h_row, h_column, x, x_row, x_column, out, row, column):  # type: ignore[no-untyped-def]
     """Add the vector h x to another."""
     return _function(types.void, (h, h_row, h_column, x, x_row, x_column, out, row, column), _vector_product)
 
 
-@intrinsic
+@_compiled
 def add_outer(_, x, x_row, x_column, y, y_row, y_column, out, row, column):  # type: ignore[no-untyped-def]
     """Add the matrix x yᵀ to another."""
     return _function(types.void, (x, x_row, x_column, y, y_row, y_column, out, row, column), _outer_product)
 
 
-@intrinsic
+@_compiled
 def inner(_, x, x_row, x_column, y, y_row, y_column):  # type: ignore[no-untyped-def]
     """Return x·y."""
     return _function(types.float64, (x, x_row, x_column, y, y_row, y_column), _inner_product)
 
 
-@intrinsic
+@_compiled
 def transpose(_, x, x_row, x_column, out, row, column):  # type: ignore[no-untyped-def]
     """Write xᵀ."""
     return _function(types.void, (x, x_row, x_column, out, row, column), _transposition)
 
 
-@intrinsic
+@_compiled
 def mirror(_, x, x_row, x_column):  # type: ignore[no-untyped-def]
     """Make x symmetric, by what is on and below its diagonal."""
     return _function(types.void, (x, x_row, x_column), _symmetry)
