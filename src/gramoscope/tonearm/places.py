@@ -162,11 +162,12 @@ class _PlaceFollower:
         measured = samples.measured(state.bin, end)
         fresh = samples.part(measured)
         followed = robustly(
-            moves(models, np.arange(state.bin, end)),
+            moves(models, state.bin, end),
             fresh.readings(first_bin=state.bin, step_m=self.step_m, gains=self.course.gains),
             ~fresh.suspect,
             state,
             gate=self.smoother.gate,
+            resume_bin=min(stop, end - 1),
         )
         flags = samples.flags.copy()
         flags[measured[~followed.accepted]] |= OUTLIER
@@ -181,7 +182,7 @@ class _PlaceFollower:
         )
         # outliers stay outliers when the next block looks at them again
         settled = samples.flagged(np.where(samples.bin < stop, flags, samples.flags)).part(samples.bin >= stop - 2)
-        return motion, followed.state(state.bin, min(stop, end - 1)), settled
+        return motion, followed.state, settled
 
     def _motion(
         self,

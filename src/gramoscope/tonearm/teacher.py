@@ -14,7 +14,7 @@ from gramoscope.disc.formats import Direction
 from gramoscope.tonearm.course import Course
 from gramoscope.tonearm.groove_model import Beliefs, GrooveModel, agitation, beginning, beliefs, moves, robustly
 from gramoscope.tonearm.groove_prior import GroovePrior
-from gramoscope.tonearm.learn_groove import PriorLimits, learn, lesson
+from gramoscope.tonearm.learn_groove import PriorLimits, learn, lessons
 from gramoscope.tonearm.level import (
     OneDirection,
     Walls,
@@ -113,13 +113,7 @@ class Teacher:
         teachers = [(_put_right(stretch, error), level) for stretch, level in cleaned]
         lateral, vertical = (
             learn(
-                [
-                    one
-                    for one in (
-                        lesson(self._seen(trusted(s), name), float(level[i]), self.step_m) for s, level in teachers
-                    )
-                    if one
-                ],
+                lessons(((self._seen(trusted(s), name), float(level[i])) for s, level in teachers), self.step_m),
                 self.step_m,
                 limits[i],
                 before=before[i] if before else None,
@@ -136,11 +130,12 @@ class Teacher:
         measured = samples.measured(first, stop)
         fresh = samples.part(measured)
         followed = robustly(
-            moves([model], np.arange(first, stop)),
+            moves([model], first, stop),
             fresh.readings(first_bin=first, step_m=self.step_m, gains=self.course.gains),
             ~fresh.suspect,
             beginning(model, first),
             gate=self.gate,
+            resume_bin=first,
         )
         suspect = samples.suspect.copy()
         suspect[measured] = ~followed.accepted
