@@ -179,6 +179,7 @@ def test_what_is_on_the_bag_comes_from_the_transfer_and_from_the_archive(tmp_pat
     )
     assert said["Bagging-Date"] == "2031-02-13"
     assert re.fullmatch(r"\d+\.10", said["Payload-Oxum"])
+    assert re.fullmatch(r"\d+\.\d kB", said["Bag-Size"])
     assert said["Bag-Software-Agent"].startswith("Gramoscope ")
     assert "Contact-Name" not in said, "what nobody gave is left out"
     label = BagLabel("Дом звука", "A. Name", "a@b.example", "+1 2", "B/2", "Two\r\nlines: one", date(2030, 1, 2))
@@ -211,7 +212,7 @@ def test_the_equaliser_is_told_in_the_archives_words_for_each_sound(
     assert preamp.get("eqShelf", {"measure": None})["measure"] == shelf_hz
     for name in ("flat.wav", "walls.wav", "vertical.wav"):
         flat = _sound(technical, name)["phonoPreamp"]
-        assert (flat["eqTurnover"]["measure"], flat["eqRolloff"]["measure"]) == (0, 0)
+        assert (flat["eq"], flat["eqTurnover"]["measure"], flat["eqRolloff"]["measure"]) == ("none", 0, 0)
 
 
 @pytest.mark.parametrize(
@@ -236,7 +237,7 @@ def test_each_sound_is_described_in_json_and_in_the_table(transfer: Path, tmp_pa
     assert walls["fileSize"]["measure"] == path.stat().st_size
     assert walls["sha256"] == hashlib.sha256(path.read_bytes()).hexdigest()
     assert walls["sampleRate"] == {"measure": 96_000.0, "unit": "Hz"}
-    assert (walls["bitDepth"], walls["channels"]) == (24, ["outer wall", "inner wall"])
+    assert (walls["bitDepth"], walls["channels"]) == (24, ["outer", "inner"])
     assert walls["durationMilli"] == {"measure": pytest.approx(1e3 * SAMPLES / 96_000, abs=1e-3), "unit": "ms"}
     with (tmp_path / "bag" / "metadata" / "technical.csv").open(encoding="utf-8", newline="") as file:
         rows = {row["filename"]: row for row in csv.DictReader(file)}

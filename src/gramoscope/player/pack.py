@@ -163,11 +163,15 @@ def _bag_info(transfer: Transfer, label: BagLabel, filling: BagFolder) -> dict[s
         "External-Identifier": label.identifier or catalogue.get("reference", "") or reference,
         "External-Description": label.description or catalogue.get("description", "") or _described(transfer.report),
         "Bagging-Date": label.bagged.isoformat(),
-        "Bag-Size": f"{filling.size_bytes / 1e6:.1f} MB",
+        "Bag-Size": _in_words(filling.size_bytes),
         "Payload-Oxum": filling.oxum,
         "Bag-Software-Agent": f"Gramoscope {version('gramoscope')}",
     }
     return {name: value for name, value in info.items() if value}
+
+
+def _in_words(size_bytes: int) -> str:
+    return f"{size_bytes / 1e6:.1f} MB" if size_bytes >= 1e6 else f"{size_bytes / 1e3:.1f} kB"
 
 
 def _described(report: Mapping[str, Any]) -> str:

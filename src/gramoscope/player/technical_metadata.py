@@ -148,7 +148,7 @@ def _phono_preamp(curve: Characteristic) -> dict[str, Any]:
     """Return a characteristic as archives write it: 0 Hz for no turnover, decibels of playback at 10 kHz."""
     shelf = {} if curve.shelf_hz is None else {"eqShelf": _measure(_rounded(curve.shelf_hz, 1), "Hz")}
     return {
-        "eq": curve.title,
+        "eq": "none" if curve.is_flat else curve.title,
         "eqTurnover": _measure(_rounded(curve.turnover_hz or 0.0, 1), "Hz"),
         # 0.0 − …, so that a flat record has no minus sign
         "eqRolloff": _measure(_rounded(0.0 - curve.rolloff_db, 1), "dB"),
