@@ -102,7 +102,7 @@ def test_the_stated_roll_off_is_the_fall_of_playback_at_10_khz_above_the_turnove
 
 
 def test_the_stated_roll_off_is_that_of_the_collectors_tables():
-    stated_db = {"riaa": 13.7, "aes": 12.3, "capitol": 12.7, "ccir": 10.5, "european-78": 0.0, "flat": 0.0}
+    stated_db = {"riaa": 13.7, "aes": 12.3, "capitol": 12.7, "mgm": 12.0, "european-78": 0.0, "flat": 0.0}
     assert {name: round(characteristic(name).rolloff_db, 1) for name in stated_db} == stated_db
 
 
