@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
+import logging
 import os
 import re
 import shutil
@@ -433,8 +434,10 @@ def test_whatever_goes_wrong_leaves_no_half_bag_and_the_transfer_as_it_was(
 
 
 def test_a_disk_that_gives_back_something_else_makes_no_bag(
-    transfer: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    transfer: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(logging.getLogger(), "handlers", [])  # as outside of the tests
+
     def progress(_: int, __: int, what: str) -> None:
         if "Checking" in what:
             (copy,) = tmp_path.glob(".bag.*.part/data/groove.png")
@@ -443,7 +446,7 @@ def test_a_disk_that_gives_back_something_else_makes_no_bag(
     with pytest.raises(OutputError, match="the bag does not hold what was written"):
         pack(transfer, tmp_path / "bag", LABEL, progress=progress)
     assert {path.name for path in tmp_path.iterdir()} == {"transfer"}
-    assert capfd.readouterr().err == "", "one message, and not the library's log"
+    assert capsys.readouterr().err == "", "one message, and not the library's log"
 
 
 def test_without_the_library_the_remedy_is_said(
