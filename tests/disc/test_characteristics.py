@@ -94,6 +94,18 @@ def test_a_roll_off_in_decibels_gives_its_corner():
         rolloff_corner_hz(0)
 
 
+@EVERY_CURVE
+def test_the_stated_roll_off_is_the_fall_of_playback_at_10_khz_above_the_turnover(curve):
+    treble = Characteristic("treble", "its treble alone", rolloff_hz=curve.rolloff_hz)
+    fall_db = decibels(treble.playback_response(10_000) / treble.playback_response(1e-3))
+    assert curve.rolloff_db == pytest.approx(-fall_db, abs=1e-9)
+
+
+def test_the_stated_roll_off_is_that_of_the_collectors_tables():
+    stated_db = {"riaa": 13.7, "aes": 12.3, "capitol": 12.7, "mgm": 12.0, "european-78": 0.0, "flat": 0.0}
+    assert {name: round(characteristic(name).rolloff_db, 1) for name in stated_db} == stated_db
+
+
 def test_nan_gives_nan_and_flat_is_flat():
     assert np.isnan(RIAA.playback_response(np.nan))
     assert np.all(characteristic("acoustic").playback_response([0, 50, 9000]) == 1)

@@ -110,6 +110,13 @@ class Characteristic:
         """Whether the record was cut without any tilt."""
         return self.turnover_hz is None and self.rolloff_hz is None
 
+    @property
+    def rolloff_db(self) -> float:
+        """How far playback falls at 10 kHz as the collectors' tables state it, R = 10 lg(1 + (10 kHz/f₃)²); 0 for none."""
+        if self.rolloff_hz is None:
+            return 0.0
+        return float(10 * np.log10(1 + (ROLLOFF_STATED_AT_HZ / self.rolloff_hz) ** 2))
+
     def recording_response(self, frequency_hz: npt.ArrayLike) -> ComplexArray:
         """Return the response of the cutter on the velocity, 1/P, 0 dB at 1 kHz.
 
