@@ -9,7 +9,7 @@ from gramoscope.tonearm.stretches import HAMPEL_GATE, REACH, running_median, sus
 def _places(seed: int) -> np.ndarray:
     """A steep course with noise, wild samples and holes."""
     rng = np.random.default_rng(seed)
-    place = 1e-7 * np.arange(60) + 4e-8 * rng.normal(size=(2, 60))
+    place = 8e-7 * np.arange(60) + 4e-8 * rng.normal(size=(2, 60))
     place[rng.random(place.shape) < 0.1] += 3e-6
     place[rng.random(place.shape) < 0.15] = np.nan
     place[0, 20:35] = np.nan
