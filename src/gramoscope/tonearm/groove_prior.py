@@ -165,12 +165,13 @@ def _series(f, noise, a, q):  # type: ignore[no-untyped-def]
     q[:] = change
     for n in range(1, TERMS):
         multiply(f, 0, 0, power, 0, 0, one, 0, 0)
-        power[:] = one / n
-        a += power
-        multiply(f, 0, 0, change, 0, 0, one, 0, 0)
-        transpose(one, 0, 0, two, 0, 0)
-        change[:] = (one + two) / (n + 1)
-        q += change
+        multiply(f, 0, 0, change, 0, 0, two, 0, 0)
+        for i in range(STATES):
+            for j in range(STATES):
+                power[i, j] = one[i, j] / n
+                a[i, j] += power[i, j]
+                change[i, j] = (two[i, j] + two[j, i]) / (n + 1)
+                q[i, j] += change[i, j]
 
 
 @numba.njit(cache=True, nogil=True)

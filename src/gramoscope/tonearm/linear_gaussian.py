@@ -133,7 +133,8 @@ class Filtered:
     wanted : float64 array, shape (wanted, block · n)
         Rows w: what the smoother will be asked for, times the state.
     toward : float64 array, shape (bin, wanted, block · n)
-        Pw, P being the covariance before the readings of a bin: all of it that the smoother needs, and a fifth of its size.
+        Pw, P being the covariance before the readings of a bin: all of it that the smoother needs. Whole covariances would not
+        fit into the processor's cache.
     missed, since : int64 arrays, shape (bin, SOURCES)
         See `FilterState`; where the place was lost, as they were before they were set to zero.
     lost : bool array, shape (bin,)

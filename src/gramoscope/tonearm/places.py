@@ -24,8 +24,8 @@ from gramoscope.signal_path import GrooveMotion, WallTrace
 from gramoscope.tonearm.course import Course
 from gramoscope.tonearm.grid_flags import OUTLIER, grid_flags
 from gramoscope.tonearm.groove_model import GrooveModel, PassState, beginning, moves, robustly, which
-from gramoscope.tonearm.place_samples import PlaceSamples, joined, samples_of
-from gramoscope.tonearm.stretches import Stretch, counted_from_the_start, handed_over, stretch_of
+from gramoscope.tonearm.place_samples import PlaceSamples, joined
+from gramoscope.tonearm.stretches import counted_from_the_start, handed_over, stretch_of
 from gramoscope.tonearm.teacher import DIRECTIONS, Teacher, Teaching
 
 UNOBSERVABLE = 0.95
@@ -126,7 +126,7 @@ class _PlaceFollower:
     course: Course
     step_m: float
 
-    def blocks(self, stretches: Iterator[tuple[Stretch, GrooveModel]]) -> Iterator[GrooveMotion]:
+    def blocks(self, stretches: Iterator[tuple[PlaceSamples, GrooveModel]]) -> Iterator[GrooveMotion]:
         """Answer bin after bin, some way behind the newest stretch."""
         pieces, models, done, last = list[PlaceSamples](), list[GrooveModel](), 0, 0
         state: PassState | None = None
@@ -134,7 +134,7 @@ class _PlaceFollower:
         while current is not None:
             taken = 0
             while current is not None and taken < self.smoother.block_groups:
-                pieces.append(samples_of(current[0], self.step_m))
+                pieces.append(current[0])
                 models.append(current[1])
                 last = max(last, int(pieces[-1].bin[-1]))
                 current, taken = next(stretches, None), taken + 1
