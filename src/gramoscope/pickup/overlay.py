@@ -190,17 +190,19 @@ def overlay_width(width: int, shift_px: FloatArray) -> int:
     return width + int(np.floor(shift_px.max(initial=0.0)))
 
 
-SLOPE_REACH = 4
+GAUSSIAN_REACH = 4
 
 
-def _slope_taps() -> Float32Array:
-    """The derivative of a Gaussian of one pixel: weights of x₁ − x₋₁ … x₄ − x₋₄, exact for a straight line."""
-    k = np.arange(1, SLOPE_REACH + 1)
-    taps = k * np.exp(-0.5 * k**2)
-    return np.asarray(taps / np.sum(2 * k * taps), np.float32)
+def _gaussian_taps() -> tuple[Float32Array, Float32Array]:
+    """A Gaussian of one pixel from its middle on, and the weights of x₁ − x₋₁ … x₄ − x₋₄ in its derivative."""
+    k = np.arange(GAUSSIAN_REACH + 1)
+    bell = np.exp(-0.5 * k**2)
+    bell /= 2 * bell.sum() - bell[0]
+    slope = k[1:] * bell[1:]
+    return bell.astype(np.float32), (slope / np.sum(2 * k[1:] * slope)).astype(np.float32)
 
 
-_SLOPE_TAPS = _slope_taps()
+_BELL, _SLOPE = _gaussian_taps()
 
 
 @numba.njit(cache=True, nogil=True, fastmath={"contract"})
@@ -209,24 +211,40 @@ def _add_difference(w, after, before, out):  # type: ignore[no-untyped-def]
         out[j] += w * (after[j] - before[j])
 
 
+@numba.njit(cache=True, nogil=True, fastmath={"contract"})
+def _smooth(wide, w, out):  # type: ignore[no-untyped-def]
+    """Smooth by five taps from the middle on; `wide` has four more values at either end."""
+    n = out.size
+    far, mid, near, next_, here = wide[:n], wide[1 : n + 1], wide[2 : n + 2], wide[3 : n + 3], wide[4 : n + 4]
+    after, beyond, past, last = wide[5 : n + 5], wide[6 : n + 6], wide[7 : n + 7], wide[8 : n + 8]
+    w0, w1, w2, w3, w4 = w[0], w[1], w[2], w[3], w[4]
+    for j in range(n):
+        inner = w0 * here[j] + w1 * (next_[j] + after[j]) + w2 * (near[j] + beyond[j])
+        out[j] = inner + w3 * (mid[j] + past[j]) + w4 * (far[j] + last[j])
+
+
 @numba.njit(cache=True, nogil=True)
-def _slope(columns, taps, slope):  # type: ignore[no-untyped-def]
+def _slope_along(columns, slope):  # type: ignore[no-untyped-def]
     width, height = columns.shape
-    one = np.empty(height, np.float32)
+    reach = GAUSSIAN_REACH
+    wide, smooth = np.empty(height + 2 * reach, np.float32), np.empty(height, np.float32)
     for x in range(width):
-        one[:] = np.float32(0)
-        for k in range(1, taps.size + 1):
-            _add_difference(taps[k - 1], columns[min(x + k, width - 1)], columns[max(x - k, 0)], one)
-        slope[:, x] = one
+        wide[:] = np.float32(0)
+        here = wide[reach : reach + height]
+        for k in range(1, reach + 1):
+            _add_difference(_SLOPE[k - 1], columns[min(x + k, width - 1)], columns[max(x - k, 0)], here)
+        wide[:reach], wide[reach + height :] = here[0], here[-1]
+        _smooth(wide, _BELL, smooth)
+        slope[:, x] = smooth
 
 
 def slope_along(columns: Float32Array) -> Float32Array:
-    """Return the derivative of a picture along the groove, by that of a Gaussian of one pixel.
+    """Return the derivative of a picture along the groove, by that of a Gaussian of one pixel in both directions.
 
     Parameters
     ----------
     columns : float32 array, shape (column, row)
-        Beyond its ends the last column is held.
+        Beyond its ends the outermost values are held.
 
     Returns
     -------
@@ -234,5 +252,5 @@ def slope_along(columns: Float32Array) -> Float32Array:
         Grey levels a pixel.
     """
     slope = np.empty(columns.shape[::-1], np.float32)
-    _slope(columns, _SLOPE_TAPS, slope)
+    _slope_along(columns, slope)
     return slope
