@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from gramoscope.cli.terminal import FINE, PROCESSORS, Terminal, Workers, several
+from gramoscope.cli.terminal import FINE, FINITE, PROCESSORS, Terminal, Workers, several
 
 SHOWN_GROUPS = 8
 
@@ -20,6 +20,9 @@ def play(
     recipe: str = "best",
     rate: int = 96_000,
     characteristic: str | None = None,
+    declick: bool = False,
+    decrackle: bool = False,
+    rumble_hz: Annotated[float | None, FINITE] = None,
     workers: Workers = PROCESSORS,
     quiet: bool = False,
     json: bool = False,
@@ -28,6 +31,10 @@ def play(
 
     Writes `flat.wav` (velocity of the groove in the direction of the cut, 24 bit, no equalisation), `equalised.wav`,
     `report.json` and `groove.png` into DIR: all of them, or nothing.
+
+    Repairs are made only when asked for, and can be undone: `flat.wav` stays as it is, and `repaired.wav`, `difference.wav`
+    (what was taken off), `cues.json` and `labels.txt` (where, the latter for Audacity) come beside it. `equalised.wav` is then
+    made of the repaired sound.
 
     What the film does not show (a chipped wall, a lost frame) is bridged, flagged and counted in the report.
 
@@ -44,6 +51,12 @@ def play(
     characteristic
         Recording characteristic to undo in `equalised.wav`: riaa, flat, aes, nab, columbia-lp, european-78, … As the capture
         says when left out, riaa (as in the paper) if it does not.
+    declick
+        Replace clicks by what their surroundings predict, with the pickup's flags as witnesses.
+    decrackle
+        Take small pulses near the noise off.
+    rumble_hz
+        Take off what lies below so many hertz, say 20.
     workers
         Stretches read at the same time; one for each processor when left out. The result does not depend on it.
     quiet
@@ -54,14 +67,15 @@ def play(
     from gramoscope.apparatus.capture import open_capture
     from gramoscope.player.play import Settings
     from gramoscope.player.play import play as play_capture
-    from gramoscope.player.recipe import load_recipe
+    from gramoscope.player.recipe import load_recipe, with_repairs
 
     terminal = Terminal(quiet, json)
     opened = open_capture(capture)
     name = characteristic or opened.bench.disc.characteristic or "riaa"
     settings = Settings(rate_hz=float(rate), characteristic_name=name, workers=workers)
+    chosen = with_repairs(load_recipe(recipe), declick=declick, decrackle=decrackle, rumble_hz=rumble_hz)
     with terminal.progress("Playing") as progress:
-        report = play_capture(opened, load_recipe(recipe), out, settings, progress=progress)
+        report = play_capture(opened, chosen, out, settings, progress=progress)
     terminal.result(report)
     tell(terminal, report, out)
     return FINE
@@ -77,7 +91,8 @@ def tell(terminal: Terminal, report: Mapping[str, Any], out: Path) -> None:
         "level": f"{level['rms_cm_s']:.2f} cm/s rms, {level['peak_cm_s']:.1f} cm/s peak",
         "noise": f"{noise['sigma_rms_cm_s']:.2f} cm/s rms by the error bars, {_below(noise)}",
         "equalised": f"{report['files']['equalised.wav']['characteristic']}",
-        "files": "  ".join(str(out / name) for name in ("flat.wav", "equalised.wav", "groove.png", "report.json")),
+        **({"repaired": _repairs(report)} if report["repair"] else {}),
+        "files": "  ".join(str(out / name) for name in (*report["files"], "groove.png", "report.json")),
     }
     terminal.table(rows)
     for remark in report["remarks"]:
@@ -87,6 +102,12 @@ def tell(terminal: Terminal, report: Mapping[str, Any], out: Path) -> None:
     more = len(report["problems"]) - 5 + report["problems_not_listed"]
     if more > 0:
         terminal.say(f"[yellow]Found:[/] {more} more problems; they are in report.json")
+
+
+def _repairs(report: Mapping[str, Any]) -> str:
+    spans, seconds = report["repair"]["spans"], report["repair"]["seconds"]
+    told = [f"{several(number, 'span')} by {kind} ({seconds[kind] * 1e3:.1f} ms)" for kind, number in spans.items()]
+    return "; ".join(told) or "nothing was found"
 
 
 def _groups(report: Mapping[str, Any]) -> str:

@@ -16,6 +16,7 @@ from gramoscope.listening.ink import save_png
 from gramoscope.listening.report import json_text
 from gramoscope.listening.wav import WavWriter
 from gramoscope.listening.whole_file import written_whole
+from gramoscope.player.repair_files import REPAIR_FILES, RepairFiles
 
 FLAT, EQUALISED, REPORT, PICTURE = "flat.wav", "equalised.wav", "report.json", "groove.png"
 
@@ -31,6 +32,8 @@ class Outputs:
     folder : Path
         Made if it does not exist.
     rate_hz : float
+    repaired : bool
+        Whether there are files of a repair; `repair` is None if not.
 
     Raises
     ------
@@ -38,9 +41,11 @@ class Outputs:
         If something cannot be written.
     """
 
-    def __init__(self, folder: Path, *, rate_hz: float) -> None:
+    def __init__(self, folder: Path, *, rate_hz: float, repaired: bool = False) -> None:
         self.folder = folder
         self._rate_hz = rate_hz
+        self._repaired = repaired
+        self.repair: RepairFiles | None = None
         self._made: list[Path] = []
 
     def __enter__(self) -> Self:
@@ -52,6 +57,8 @@ class Outputs:
                 undo.callback(self.flat.discard)
                 self.equalised = WavWriter(self.folder / EQUALISED, rate_hz=self._rate_hz)
                 undo.callback(self.equalised.discard)
+                if self._repaired:
+                    self.repair = RepairFiles(self.folder, rate_hz=self._rate_hz)
             undo.pop_all()
         return self
 
@@ -60,6 +67,8 @@ class Outputs:
         text = json_text(report)
         self.flat.finish()
         self.equalised.finish()
+        if self.repair is not None:
+            self.repair.finish()
         report_whole, picture_whole = (written_whole(self.folder / name) for name in (REPORT, PICTURE))
         with contextlib.ExitStack() as holding, report_whole as report_part, picture_whole as picture_part:
             report_part.write_text(text, encoding="utf-8")
@@ -70,14 +79,26 @@ class Outputs:
             (self.folder / REPORT).unlink(missing_ok=True)
             self.flat.commit()
             self.equalised.commit()
+            if self.repair is not None:
+                self.repair.commit()
+            else:
+                self._remove_older_repair()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.flat.discard()
         self.equalised.discard()
+        if self.repair is not None:
+            self.repair.discard()
         if kind is not None:
             self._remove_made()
+
+    def _remove_older_repair(self) -> None:
+        # a repair of another transfer would not add up with this one
+        for name in REPAIR_FILES:
+            with contextlib.suppress(OSError):
+                (self.folder / name).unlink(missing_ok=True)
 
     def _make_folder(self) -> None:
         self._made = [path for path in (self.folder, *self.folder.parents) if not path.exists()]

@@ -76,7 +76,8 @@ def play(
     capture : Capture
     recipe : Recipe
     folder : Path
-        Where `flat.wav`, `equalised.wav`, `report.json` and `groove.png` go.
+        Where `flat.wav`, `equalised.wav`, `report.json` and `groove.png` go, and the files of a repair if the recipe asks
+        for one (`gramoscope.player.repair_files`); `equalised.wav` is then made of the repaired sound.
     settings : Settings
     progress : callable, optional
         Told how much is done, of how much, and of what ("Learning", "Playing").
@@ -100,13 +101,13 @@ def play(
     resampler = Resampler(bench.rotation, direction, settings.rate_hz, recipe.passband)
     hashes, monitor = InputHashes(), _monitor(capture, settings.rate_hz)
 
-    with Outputs(folder, rate_hz=settings.rate_hz) as files:
+    with Outputs(folder, rate_hz=settings.rate_hz, repaired=recipe.repair.asked) as files:
         pickup = learned(capture, recipe, settings.workers, progress=progress)
         traces = _picked_up(capture, pickup, settings.workers, hashes, monitor, progress)
         spliced = _spliced(traces, recipe, monitor)
         motion = tonearm.follow(spliced)
         flat = _written(resampler.resample(motion), files, monitor)
-        for piece in equaliser.equalise(flat):
+        for piece in equaliser.equalise(_repaired(flat, recipe, files)):
             files.equalised.write(piece.samples)
         _require_sound(monitor)
         report = transfer_report(
@@ -166,6 +167,15 @@ def _written(pieces: Iterator[Audio], files: Outputs, monitor: Monitor) -> Itera
         files.flat.write(piece.samples)
         monitor.heard(piece)
         yield piece
+
+
+def _repaired(pieces: Iterator[Audio], recipe: Recipe, files: Outputs) -> Iterator[Audio]:
+    if files.repair is None:
+        yield from pieces
+        return
+    for raw, repaired in recipe.repair.repair(pieces, files.repair.note):
+        files.repair.write(raw, repaired)
+        yield repaired
 
 
 def _monitor(capture: Capture, rate_hz: float) -> Monitor:

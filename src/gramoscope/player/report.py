@@ -12,6 +12,7 @@ from gramoscope.player.monitor import Monitor
 from gramoscope.player.outputs import EQUALISED, FLAT, Outputs
 from gramoscope.player.provenance import InputHashes, bench_of, command_line, recipe_of, versions
 from gramoscope.player.recipe import Recipe
+from gramoscope.player.repair_files import REPAIRED
 from gramoscope.quality import Quality, describe
 
 if TYPE_CHECKING:
@@ -52,12 +53,14 @@ def transfer_report(
                 "clipped_samples": files.flat.clipped_samples,
             },
             EQUALISED: {
-                "what": "the same with the recording characteristic undone, 0 dB at 1 kHz",
+                "what": f"{_equalised_from(files)} with the recording characteristic undone, 0 dB at 1 kHz",
                 "characteristic": settings.characteristic_name,
                 "full_scale_m_s": files.equalised.full_scale_m_s,
                 "clipped_samples": files.equalised.clipped_samples,
             },
+            **(files.repair.files() if files.repair is not None else {}),
         },
+        "repair": files.repair.as_dict(recipe.repair) if files.repair is not None else None,
         "flags": {str(flag.name).lower(): describe(flag) for flag in Quality},
         "capture_problems": list(capture.problems),
         "recipe": recipe_of(recipe),
@@ -67,6 +70,10 @@ def transfer_report(
         "elapsed_s": elapsed_s,
         "real_time_factor": seconds / elapsed_s,
     }
+
+
+def _equalised_from(files: Outputs) -> str:
+    return "the same" if files.repair is None else f"{REPAIRED}"
 
 
 def _remarks(capture: Capture, walls: tuple[str, ...]) -> tuple[str, ...]:
