@@ -36,6 +36,9 @@ from gramoscope.conventions import BoolArray, FloatArray, IntArray
 
 WHITE_SHARE = 1e-9
 """White noise added to what is fitted, as a share of its power: keeps a band without sound from making the fit singular."""
+SCALE_WINDOW = 960
+"""Samples: 10 ms at 96 kHz, several times the longest click and a fraction of a syllable."""
+LOWEST_SCALE = 0.3
 
 _NORMAL_QUARTILE = 0.6744897501960817
 
@@ -66,8 +69,11 @@ def fit(samples: FloatArray, *, order: int) -> FloatArray:
     return np.concatenate([[1.0], -solve_toeplitz(correlation[:-1], correlation[1:])])
 
 
-def excitation_scale(samples: FloatArray, coefficients: FloatArray, *, used: BoolArray) -> float:
-    """Return s by the median of the prediction errors' sizes: a tenth of the samples may be spoilt, and it hardly moves.
+def excitation_scale(samples: FloatArray, coefficients: FloatArray, *, used: BoolArray) -> FloatArray:
+    """Return s at every sample, by the median of the sizes of the prediction errors around it.
+
+    A tenth of the samples may be spoilt, and it hardly moves. It follows a sound that swells: medians are taken over
+    `SCALE_WINDOW` samples at every quarter of that, never less than `LOWEST_SCALE` of the median of all, and joined by lines.
 
     Parameters
     ----------
@@ -78,13 +84,23 @@ def excitation_scale(samples: FloatArray, coefficients: FloatArray, *, used: Boo
 
     Returns
     -------
-    float
+    float64 array, shape (sample,)
         In the unit of the samples; 0 if none counts.
     """
     errors = np.abs(lfilter(coefficients, [1.0], samples))
     kept = used.copy()
     kept[: coefficients.size - 1] = False
-    return float(np.median(errors[kept]) / _NORMAL_QUARTILE) if kept.any() else 0.0
+    if not kept.any():
+        return np.zeros(samples.size)
+    overall = float(np.median(errors[kept]))
+    middles = np.arange(0, samples.size + SCALE_WINDOW // 4, SCALE_WINDOW // 4)
+    around = [slice(max(middle - SCALE_WINDOW // 2, 0), middle + SCALE_WINDOW // 2) for middle in middles]
+    enough = [np.count_nonzero(kept[part]) > SCALE_WINDOW // 4 for part in around]
+    local = [
+        np.median(errors[part][kept[part]]) if many else overall for part, many in zip(around, enough, strict=True)
+    ]
+    level = np.interp(np.arange(samples.size), middles, np.maximum(local, LOWEST_SCALE * overall))
+    return np.asarray(level / _NORMAL_QUARTILE, np.float64)
 
 
 @numba.njit(cache=True, nogil=True)

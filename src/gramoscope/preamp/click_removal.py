@@ -57,14 +57,17 @@ def under_clicks(
     click *= np.repeat(np.logical_and.reduceat(seen, first), count)[:, np.newaxis]
     reach = click.shape[1]
     weight = np.zeros_like(click)
+    power_of_excitation = process.scale[unknown] ** 2
     for _ in range(ITERATIONS):
         mean, covariance = conditional(process.band, samples, unknown, weight)
         error = samples[unknown] - mean
-        spread = process.scale**2 * np.sum(click * covariance[:, :reach] * np.minimum(np.arange(reach) + 1, 2), axis=1)
+        spread = power_of_excitation * np.sum(
+            click * covariance[:, :reach] * np.minimum(np.arange(reach) + 1, 2), axis=1
+        )
         power = np.add.reduceat(error * times(click, error) + spread, first) / count
         known = np.repeat(power, count)[:, np.newaxis]
-        weight = np.divide(click * process.scale**2, known, out=np.zeros_like(click), where=known > 0)
-    return mean, process.scale * np.sqrt(covariance[:, 0])
+        weight = np.divide(click * power_of_excitation[:, np.newaxis], known, out=np.zeros_like(click), where=known > 0)
+    return mean, process.scale[unknown] * np.sqrt(covariance[:, 0])
 
 
 def _click_precision(counts: IntArray, rate_hz: float) -> FloatArray:

@@ -49,14 +49,14 @@ class Process:
         Q, as `gramoscope.preamp.autoregression.precision` returns it.
     autocorrelation : float64 array, shape (2 order + 1,)
         Any row of Q far from both ends.
-    scale : float
-        s, in the unit of the sound.
+    scale : float64 array, shape (sample,)
+        s, in the unit of the sound; 0 in silence.
     """
 
     coefficients: FloatArray
     band: FloatArray
     autocorrelation: FloatArray
-    scale: float
+    scale: FloatArray
 
 
 def learned_process(samples: FloatArray, *, order: int, used: BoolArray) -> Process:
@@ -86,7 +86,7 @@ def significance(process: Process, samples: FloatArray, sigma: FloatArray) -> tu
         In samples. Those of an even length reach one sample further back than ahead.
     """
     best, length = np.zeros(samples.size), np.ones(samples.size, np.int64)
-    if not process.scale > 0:
+    if not process.scale.any():
         return best, length
     weighted = times(process.band, samples)
     more = excess_variance(sigma)
@@ -150,8 +150,10 @@ def _search(
     for _ in range(passes):
         filled = filled_in(process, samples, spoilt)
         z, length = significance(process, filled, sigma)
+        forward, backward = prediction_errors(process, filled, sigma)
         found = _strongest(z, z > threshold, length, reach=order)
-        found = _grown(found, unpredicted(process, filled, sigma) > GROWTH)
+        unpredicted = np.minimum(maximum_filter1d(forward, NEIGHBOURS), maximum_filter1d(backward, NEIGHBOURS))
+        found = _grown(found, unpredicted > GROWTH)
         if not np.any(found & ~spoilt):
             break
         spoilt = spoilt | found
@@ -168,21 +170,26 @@ def filled_in(process: Process, samples: FloatArray, unknown: BoolArray) -> Floa
     return filled
 
 
-def unpredicted(process: Process, samples: FloatArray, sigma: FloatArray) -> FloatArray:
-    """Return how many standard errors each sample, or one of its neighbours, differs from its past and from its future.
+def prediction_errors(process: Process, samples: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return how many standard errors each sample differs from its prediction by those before, and by those after it.
 
-    The smaller of the two counts: a click spoils the predictions forward from its first sample on, those backward up to its
-    last, so that both are wrong from its first to its last.
+    A click spoils the predictions forward from its first sample on, those backward up to its last, so that both are wrong from
+    its first to its last. Infinite where there is too little to predict from, 0 in silence.
     """
     order = process.coefficients.size - 1
-    if not process.scale > 0:
-        return np.zeros(samples.size)
-    more = lfilter(process.coefficients**2, [1.0], excess_variance(sigma))
-    forward = np.abs(lfilter(process.coefficients, [1.0], samples)) / np.sqrt(process.scale**2 + more)
-    more = lfilter(process.coefficients**2, [1.0], excess_variance(sigma)[::-1])
-    backward = (np.abs(lfilter(process.coefficients, [1.0], samples[::-1])) / np.sqrt(process.scale**2 + more))[::-1]
+    if not process.scale.any():
+        return np.zeros(samples.size), np.zeros(samples.size)
+    forward = _prediction_error(process.coefficients, process.scale, samples, sigma)
+    backward = _prediction_error(process.coefficients, process.scale[::-1], samples[::-1], sigma[::-1])[::-1].copy()
     forward[:order], backward[samples.size - order :] = np.inf, np.inf
-    return np.minimum(maximum_filter1d(forward, NEIGHBOURS), maximum_filter1d(backward, NEIGHBOURS))
+    return forward, backward
+
+
+def _prediction_error(
+    coefficients: FloatArray, scale: FloatArray, samples: FloatArray, sigma: FloatArray
+) -> FloatArray:
+    more = lfilter(coefficients**2, [1.0], excess_variance(sigma))
+    return np.asarray(np.abs(lfilter(coefficients, [1.0], samples)) / np.sqrt(scale**2 + more))
 
 
 def _grown(seeds: BoolArray, unpredicted: BoolArray) -> BoolArray:

@@ -56,6 +56,8 @@ class Decrackler:
     ----------
     probability : float
         A pulse is taken off where it is so likely, at the least, to be there.
+    least_density_hz : float
+        Blocks with fewer pulses a second are left alone: crackle is many small clicks, and a few are a plosive or a beat.
     order : int
         Of the autoregressive process, in samples.
     block_s : float
@@ -64,11 +66,13 @@ class Decrackler:
     """
 
     probability: float = 0.5
+    least_density_hz: float = 150.0
     order: int = 32
     block_s: float = 0.02
 
     def __post_init__(self) -> None:
         require(0 < self.probability < 1, f"a probability of {self.probability:g}", "one between 0 and 1")
+        require(self.least_density_hz >= 0, f"a least density of {self.least_density_hz:g} a second", "0 or more")
         require(self.order >= 1, f"an order of {self.order}", "at least one sample")
         require(self.block_s > 0, f"blocks of {self.block_s:g} s", "a positive time")
 
@@ -117,7 +121,9 @@ class Decrackler:
         audio = window.audio
         if audio.samples.size < 4 * self.order:
             return Findings(window, None, [])
-        likely = find_crackle(audio.samples, audio.sigma, order=self.order)[0] >= self.probability
+        alpha = find_crackle(audio.samples, audio.sigma, order=self.order)[0]
+        dense = np.sum(alpha) * audio.rate_hz >= self.least_density_hz * audio.samples.size
+        likely = (alpha >= self.probability) & dense
         touched = _laid_down(likely.astype(np.float64), 2) > 0
         if touched.any():
             touched = np.asarray(binary_dilation(touched, iterations=MARGIN), np.bool_)
@@ -147,7 +153,7 @@ def find_crackle(samples: FloatArray, sigma: FloatArray, *, order: int) -> tuple
     density, height = FIRST_DENSITY, FIRST_HEIGHT
     for _ in range(ESTIMATES):
         process = learned_process(cleaned, order=order, used=everywhere)
-        if not process.scale > 0:
+        if not process.scale.any():
             return alpha, mean, variance
         whitened = np.zeros((len(shapes), order + max(PULSE_LENGTHS)))
         for g, shape in zip(whitened, shapes, strict=True):
@@ -156,7 +162,7 @@ def find_crackle(samples: FloatArray, sigma: FloatArray, *, order: int) -> tuple
         noise = _noise_variance(process.autocorrelation, shapes, energy, process.scale, sigma)
         errors = lfilter(process.coefficients, [1.0], samples)
         errors[:order] = 0.0  # no past to predict them from
-        slab = height**2 * process.scale**2 / energy
+        slab = height**2 * np.median(process.scale) ** 2 / energy
         alpha, mean, variance = mean_field(errors, whitened, noise, slab, density, SWEEPS)
         cleaned = samples - _laid_down(alpha * mean, 1)
         density = float(np.clip(np.sum(alpha) / samples.size, LOWEST_DENSITY, HIGHEST_DENSITY))
@@ -224,12 +230,12 @@ def pulses() -> list[FloatArray]:
 
 
 def _noise_variance(
-    autocorrelation: FloatArray, shapes: list[FloatArray], energy: FloatArray, scale: float, sigma: FloatArray
+    autocorrelation: FloatArray, shapes: list[FloatArray], energy: FloatArray, scale: FloatArray, sigma: FloatArray
 ) -> FloatArray:
     """Return s² and what the samples' own errors add to it beyond the usual, as in `gramoscope.preamp.click_search`."""
     more = excess_variance(sigma)
     if not more.any():
-        return np.full((len(shapes), sigma.size), scale**2)
+        return np.tile(scale**2, (len(shapes), 1))
     seen = [
         laid_about(more, np.convolve(autocorrelation, shape) ** 2, lead=autocorrelation.size // 2) for shape in shapes
     ]
