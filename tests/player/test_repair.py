@@ -73,7 +73,7 @@ def test_a_table_in_the_recipe_asks_for_a_repair_and_none_leaves_it_out() -> Non
     assert not recipe_of_table({}).repair.asked
     recipe = recipe_of_table({"preamp": {"declick": {}, "rumble": {"corner_hz": 35.0}}})
     assert recipe.repair == Repair(declick=Declicker(), rumble=RumbleFilter(35.0))
-    assert recipe_of_table(table_of_recipe(recipe)) == recipe
+    assert recipe_of_table(table_of_recipe(recipe)).repair == recipe.repair
     assert recipe_of(recipe)["sha256"] != recipe_of(recipe_of_table({}))["sha256"]
 
 

@@ -96,6 +96,8 @@ def test_windows_lie_at_multiples_of_the_block_whatever_the_pieces(sounds: Any, 
         for one, other in zip(whole, parts, strict=True):
             sounds.same(one.audio, other.audio)
             assert (one.start, one.stop) == (other.start, other.stop)
+    assert all(window.start == 320 for window in whole[2:])
+    assert all(window.audio.samples.size == 1280 for window in whole[2:-2])
     blocks = sounds.whole(window.block for window in whole)
     sounds.same(blocks, sound)
     assert all(window.block.start_sample % 640 == 0 for window in whole[1:])

@@ -93,8 +93,8 @@ class Declicker:
         Audio
             The same samples, whatever the pieces they came in; at the most two blocks are held back. What is replaced is
             flagged `DECLICKED` and has the standard error of what replaces it; everything else is passed on bit for bit.
-            A sample that is flagged `INTERPOLATED` already is replaced if its surroundings know it better than its `sigma`
-            claims. A passage of fewer samples than four times the order is passed on as it is.
+            What was interpolated while reading stays, unless its `sigma` is not known: the tonearm bridges better than this
+            does (docs/decisions/0012). A passage of fewer samples than four times the order is passed on as it is.
 
         Raises
         ------
@@ -133,7 +133,8 @@ class Declicker:
         if audio.samples.size < 4 * self.order:
             return Findings(window, None, [])
         longest = self._longest(audio.rate_hz)
-        gaps = [run for run in runs_of(flagged(audio.flags, Quality.INTERPOLATED)) if len(run) <= longest]
+        unseen = flagged(audio.flags, Quality.INTERPOLATED) & np.isnan(audio.sigma)
+        gaps = [run for run in runs_of(unseen) if len(run) <= longest]
         damaged = flagged(audio.flags, WITNESSES)
         spoilt, process = find_clicks(
             audio.samples,

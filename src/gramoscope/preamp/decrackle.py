@@ -34,7 +34,7 @@ from gramoscope.conventions import FloatArray
 from gramoscope.errors import require
 from gramoscope.preamp.click_search import excess_variance, filled_in, laid_about, learned_process
 from gramoscope.preamp.pieces import Window, windows
-from gramoscope.preamp.spoilt import Findings, findings, repaired, with_gaps
+from gramoscope.preamp.spoilt import Findings, findings, repaired, runs_of, with_gaps
 from gramoscope.quality import Quality
 from gramoscope.signal_path import Audio
 
@@ -66,7 +66,7 @@ class Decrackler:
     """
 
     probability: float = 0.5
-    least_density_hz: float = 150.0
+    least_density_hz: float = 250.0
     order: int = 32
     block_s: float = 0.02
 
@@ -122,11 +122,11 @@ class Decrackler:
         if audio.samples.size < 4 * self.order:
             return Findings(window, None, [])
         alpha = find_crackle(audio.samples, audio.sigma, order=self.order)[0]
-        dense = np.sum(alpha) * audio.rate_hz >= self.least_density_hz * audio.samples.size
-        likely = (alpha >= self.probability) & dense
-        touched = _laid_down(likely.astype(np.float64), 2) > 0
+        touched = _laid_down((alpha >= self.probability).astype(np.float64), 2) > 0
         if touched.any():
             touched = np.asarray(binary_dilation(touched, iterations=MARGIN), np.bool_)
+        if len(runs_of(touched)) * audio.rate_hz < self.least_density_hz * audio.samples.size:
+            return Findings(window, None, [])
         process = learned_process(audio.samples, order=self.order, used=~touched)
         process = learned_process(filled_in(process, audio.samples, touched), order=self.order, used=~touched)
         return findings(window, process, touched, longest=(window.stop - window.start) // 4)
@@ -199,18 +199,18 @@ def mean_field(
     count = errors.size
     rest = np.concatenate((errors, np.zeros(taps)))
     alpha, mean, variance = np.zeros((kinds, count)), np.zeros((kinds, count)), np.zeros((kinds, count))
+    energy = np.sum(whitened**2, axis=1)
     odds = np.log(density / kinds / (1 - density / kinds))
     for _ in range(sweeps):
         for n in range(count):
             for kind in range(kinds):
                 g = whitened[kind]
                 before = alpha[kind, n] * mean[kind, n]
-                seen, energy = 0.0, 0.0
-                for k in range(min(taps, count - n)):
+                seen = 0.0
+                for k in range(taps):  # beyond the end there is silence, and a pulse there is thought smaller
                     seen += g[k] * rest[n + k]
-                    energy += g[k] * g[k]
-                v = 1.0 / (energy / noise[kind, n] + 1.0 / slab[kind])
-                m = v * (seen + before * energy) / noise[kind, n]
+                v = 1.0 / (energy[kind] / noise[kind, n] + 1.0 / slab[kind])
+                m = v * (seen + before * energy[kind]) / noise[kind, n]
                 logit = odds + 0.5 * np.log(v / slab[kind]) + min(m * m / (2 * v), 700.0)
                 a = 1.0 / (1.0 + np.exp(-logit)) if logit > -30.0 else 0.0
                 alpha[kind, n], mean[kind, n], variance[kind, n] = a, m, v

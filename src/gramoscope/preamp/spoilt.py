@@ -58,8 +58,7 @@ def repaired(found: Iterable[Findings], *, flag: Quality, history_line: str) -> 
     Yields
     ------
     Audio
-        One for each block, a block late. What is replaced has the standard error of what replaces it. What nobody measured
-        (`INTERPOLATED`) is replaced only where that is smaller than the one it has.
+        One for each block, a block late. What is replaced has the standard error of what replaces it.
     """
     earlier = _Patch.empty()
     for before, here, after in _neighbours(found):
@@ -125,20 +124,11 @@ def _patch(here: Findings, around: Iterable[Findings | None]) -> _Patch:
     every = [_moved(run, -audio.start_sample) for each in around if each for run in each.runs]
     spoilt = marks_of(every, audio.samples.size)
     unknown = np.flatnonzero(spoilt)
-    seen = ~flagged(audio.flags[unknown], Quality.INTERPOLATED)
+    seen = np.isfinite(audio.sigma[unknown])
     mean, error = under_clicks(process, audio.samples, unknown, seen=seen, rate_hz=audio.rate_hz)
     ours = [run for run in runs_of(spoilt) if here.window.start <= run.start < here.window.stop]
-    better = [run for run in ours if _is_better(error[(unknown >= run.start) & (unknown < run.stop)], audio, run)]
-    kept = marks_of(better, audio.samples.size)[unknown]
+    kept = marks_of(ours, audio.samples.size)[unknown]
     return _Patch(unknown[kept] + audio.start_sample, mean[kept], error[kept])
-
-
-def _is_better(error: FloatArray, audio: Audio, run: range) -> bool:
-    """Whether a filling has smaller errors than what stands there. What was measured is replaced anyway: it was a click."""
-    part = slice(run.start, run.stop)
-    if not np.all(flagged(audio.flags[part], Quality.INTERPOLATED)):
-        return True
-    return not np.sum(error**2) >= np.sum(audio.sigma[part] ** 2)  # an unknown sigma is worse than any
 
 
 def _patched(block: Audio, *patches: _Patch, flag: Quality) -> Audio:
