@@ -75,9 +75,7 @@ def _transfer(
                 pass
         pickup: Any = SimpleNamespace(walls=("inner", "outer"), calibration={})
         anything: Any = capture
-        report = transfer_report(
-            anything, recipe, pickup, settings, InputHashes(), monitor, files.complete(), elapsed_s=1.0
-        )
+        report = transfer_report(anything, recipe, pickup, settings, InputHashes(), monitor, files, elapsed_s=1.0)
         files.finish(report, Figure(figsize=(1, 1)))
     return folder
 

@@ -20,6 +20,9 @@ def play(
     recipe: str = "best",
     rate: int = 96_000,
     characteristic: str | None = None,
+    declick: bool = False,
+    decrackle: bool = False,
+    rumble_hz: Annotated[float | None, FINITE] = None,
     flac: bool = False,
     full_scale_cm_s: Annotated[float, FINITE] = 50.0,
     title: str = "",
@@ -36,6 +39,10 @@ def play(
     `walls.wav` (outer and inner wall for themselves), `vertical.wav` (up and down), `equalised.wav`, each Broadcast Wave of
     24 bit with its SHA-256 beside it; `report.json` and `groove.png`.
 
+    Repairs are made only when asked for, and can be undone: `flat.wav` stays as it is, and `repaired.wav`, `difference.wav`
+    (what was taken off), `cues.json` and `labels.txt` (where, the latter for Audacity) come beside it. `equalised.wav` is then
+    made of the repaired sound.
+
     What the film does not show (a chipped wall, a lost frame) is bridged, flagged and counted in the report.
 
     Parameters
@@ -51,6 +58,12 @@ def play(
     characteristic
         Recording characteristic to undo in `equalised.wav`: riaa, flat, aes, nab, columbia-lp, european-78, … As the capture
         says when left out, riaa (as in the paper) if it does not.
+    declick
+        Replace clicks by what their surroundings predict, with the pickup's flags as witnesses.
+    decrackle
+        Take small pulses near the noise off.
+    rumble_hz
+        Take off what lies below so many hertz, say 20.
     flac
         Write every sound as FLAC too: the same samples in about half the room.
     full_scale_cm_s
@@ -76,15 +89,16 @@ def play(
     from gramoscope.player.catalogue import Catalogue
     from gramoscope.player.play import Settings
     from gramoscope.player.play import play as play_capture
-    from gramoscope.player.recipe import load_recipe
+    from gramoscope.player.recipe import load_recipe, with_repairs
 
     terminal = Terminal(quiet, json)
     opened = open_capture(capture)
     name = characteristic or opened.bench.disc.characteristic or "riaa"
     catalogue = Catalogue(title=title, originator=originator, reference=reference, description=description)
     settings = Settings(float(rate), name, workers, full_scale_cm_s / 100, flac, catalogue)
+    chosen = with_repairs(load_recipe(recipe), declick=declick, decrackle=decrackle, rumble_hz=rumble_hz)
     with terminal.progress("Playing") as progress:
-        report = play_capture(opened, load_recipe(recipe), out, settings, progress=progress)
+        report = play_capture(opened, chosen, out, settings, progress=progress)
     terminal.result(report)
     tell(terminal, report, out)
     return FINE
@@ -100,6 +114,7 @@ def tell(terminal: Terminal, report: Mapping[str, Any], out: Path) -> None:
         "level": f"{level['rms_cm_s']:.2f} cm/s rms, {level['peak_cm_s']:.1f} cm/s peak",
         "noise": f"{noise['sigma_rms_cm_s']:.2f} cm/s rms by the error bars, {_below(noise)}",
         "equalised": f"{report['files']['equalised.wav']['characteristic']}",
+        **({"repaired": _repairs(report)} if report["repair"] else {}),
         "files": "  ".join(str(out / name) for name in _names(report)),
     }
     terminal.table(rows)
@@ -114,7 +129,15 @@ def tell(terminal: Terminal, report: Mapping[str, Any], out: Path) -> None:
 
 def _names(report: Mapping[str, Any]) -> list[str]:
     sounds = [[name, *([file["flac"]["name"]] if "flac" in file else [])] for name, file in report["files"].items()]
-    return [*(name for names in sounds for name in names), "groove.png", "report.json"]
+    cues = report["repair"]["cues"] if report["repair"] else {}
+    lists = [cues[which] for which in ("name", "labels") if which in cues]
+    return [*(name for names in sounds for name in names), *lists, "groove.png", "report.json"]
+
+
+def _repairs(report: Mapping[str, Any]) -> str:
+    spans, seconds = report["repair"]["spans"], report["repair"]["seconds"]
+    told = [f"{several(number, 'span')} by {kind} ({seconds[kind] * 1e3:.1f} ms)" for kind, number in spans.items()]
+    return "; ".join(told) or "nothing was found"
 
 
 def _groups(report: Mapping[str, Any]) -> str:

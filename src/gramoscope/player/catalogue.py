@@ -65,9 +65,8 @@ def metadata_of(
     reference = words.reference or ascii_text(capture_name)[:REFERENCE]
     description = _description(words.description or record_in_words(title, disc.notes), track, settings)
     medium = f"gramophone record; {bench.rotation.rpm:g} rpm; {disc.cut} cut"
-    done = (
-        f"{program}; optical; recipe {recipe.name}; {track.done(settings)}; full scale {settings.full_scale_m_s:g} m/s"
-    )
+    steps = track.done(settings, recipe)
+    done = f"{program}; optical; recipe {recipe.name}; {steps}; full scale {settings.full_scale_m_s:g} m/s"
     mode = "mono" if len(track.channels) == 1 else "dual-mono"
     made = words.made.astimezone(UTC)
     label = " ".join(disc.notes[name] for name in ("label", "matrix", "side") if name in disc.notes)
@@ -91,7 +90,7 @@ def metadata_of(
             "IMED": medium,
             "ICRD": made.strftime("%Y-%m-%d"),
             "ISFT": program,
-            "ICMT": f"{track.what}; {track.done(settings)}",
+            "ICMT": f"{track.what}; {steps}",
         },
     )
 

@@ -10,6 +10,7 @@ import os
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -29,7 +30,19 @@ from gramoscope.player.picture import groove_picture
 from gramoscope.player.provenance import InputHashes, hash_group
 from gramoscope.player.recipe import Recipe
 from gramoscope.player.report import transfer_report
-from gramoscope.player.tracks import EQUALISED, FLAT, TRACKS, VERTICAL, WALLS, alone, vertical
+from gramoscope.player.tracks import (
+    DIFFERENCE,
+    EQUALISED,
+    FLAT,
+    REPAIRED,
+    VERTICAL,
+    WALLS,
+    alone,
+    left_of_repair,
+    taken_by_repair,
+    tracks_of,
+    vertical,
+)
 from gramoscope.player.workers import in_order, spreading
 from gramoscope.preamp.equalisation import Equaliser
 from gramoscope.preamp.resample import Resampler
@@ -132,11 +145,11 @@ def play(
         sound = files.kept(WALLS, resampler.resample(motion), WallSplitter(direction, pickup.walls).split)
         sound = files.kept(VERTICAL, sound, vertical)
         flat = files.kept(FLAT, _heard((in_direction(piece, direction) for piece in sound), monitor), alone)
-        for _ in files.kept(EQUALISED, equaliser.equalise(flat), alone):
+        for _ in files.kept(EQUALISED, equaliser.equalise(_repaired(flat, recipe, files, settings)), alone):
             pass
         _require_sound(monitor)
         report = transfer_report(
-            capture, recipe, pickup, settings, hashes, monitor, files.complete(), time.perf_counter() - started
+            capture, recipe, pickup, settings, hashes, monitor, files, time.perf_counter() - started
         )
         picture = groove_picture(capture, pickup, monitor, rate_hz=settings.rate_hz, recipe_name=recipe.name)
         files.finish(report, picture)
@@ -193,9 +206,22 @@ def _heard(pieces: Iterator[Audio], monitor: Monitor) -> Iterator[Audio]:
         yield piece
 
 
+def _repaired(pieces: Iterator[Audio], recipe: Recipe, files: Outputs, settings: Settings) -> Iterator[Audio]:
+    """Repair what is asked for; what is left and what was taken off are kept."""
+    if files.cues is None:
+        yield from pieces
+        return
+    left, taken = (partial(part, full_scale_m_s=settings.full_scale_m_s) for part in (left_of_repair, taken_by_repair))
+    pairs = files.kept(REPAIRED, recipe.repair.repair(pieces, files.cues.note), left)
+    for _, repaired in files.kept(DIFFERENCE, pairs, taken):
+        yield repaired
+
+
 def _outputs(capture: Capture, recipe: Recipe, folder: Path, settings: Settings) -> Outputs:
     name = capture.folder.resolve().name
-    tracks = {track: metadata_of(track, capture.bench, recipe, settings, capture_name=name) for track in TRACKS}
+    tracks = {
+        track: metadata_of(track, capture.bench, recipe, settings, capture_name=name) for track in tracks_of(recipe)
+    }
     return Outputs(folder, tracks, rate_hz=settings.rate_hz, full_scale_m_s=settings.full_scale_m_s, flac=settings.flac)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
+from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass, replace
 from difflib import get_close_matches
 from importlib import resources
 from pathlib import Path
@@ -24,7 +24,11 @@ from gramoscope.pickup.flow.horn_schunck import GrooveHornSchunck, HornSchunck
 from gramoscope.pickup.flow.multigrid_horn_schunck import MultigridHornSchunck
 from gramoscope.pickup.seed_paper import SeedPaperPickup
 from gramoscope.pickup.texture_likelihood import TextureLikelihood
+from gramoscope.preamp.declick import Declicker
+from gramoscope.preamp.decrackle import Decrackler
+from gramoscope.preamp.repair import Repair
 from gramoscope.preamp.resample import DEFAULT_PASSBAND
+from gramoscope.preamp.rumble import RumbleFilter
 from gramoscope.tonearm.follow import KalmanSmoother, PlaceSmoother, Smoother
 from gramoscope.tonearm.splice import Splice
 
@@ -39,6 +43,7 @@ _FLOWS: dict[str, type[FlowMethod]] = {
     "multigrid-horn-schunck": MultigridHornSchunck,
 }
 _SMOOTHERS: dict[str, type[KalmanSmoother] | type[PlaceSmoother]] = {"slopes": KalmanSmoother, "places": PlaceSmoother}
+_REPAIRS: dict[str, type[Any]] = {"declick": Declicker, "decrackle": Decrackler, "rumble": RumbleFilter}
 # what a table that names none gets
 _CARTRIDGE, _FLOW, _SMOOTHER = "seed-paper", "groove-horn-schunck", "slopes"
 Part = TypeVar("Part")
@@ -59,6 +64,8 @@ class Recipe:
     smoother : KalmanSmoother or PlaceSmoother
     passband : float
         Of the resampler.
+    repair : Repair
+        Nothing, unless there are tables `[preamp.declick]`, `[preamp.decrackle]` or `[preamp.rumble]`, which may be empty.
     """
 
     name: str
@@ -68,6 +75,7 @@ class Recipe:
     splice: Splice = field(default_factory=Splice)
     smoother: Smoother = field(default_factory=KalmanSmoother)
     passband: float = DEFAULT_PASSBAND
+    repair: Repair = field(default_factory=Repair)
 
     def cartridge_for(self, bench: Bench) -> Cartridge:
         """Return the cartridge, fitted to an apparatus."""
@@ -126,7 +134,7 @@ def recipe_of_table(table: Mapping[str, Any]) -> Recipe:
     _only(table, ("name", "about", "pickup", "tonearm", "preamp"), "the recipe")
     pickup, tonearm, preamp = (_table(table, key) for key in ("pickup", "tonearm", "preamp"))
     _only(tonearm, ("splice", "smoother"), "[tonearm]")
-    _only(preamp, ("passband",), "[preamp]")
+    _only(preamp, ("passband", *_REPAIRS), "[preamp]")
     name, parameters = _cartridge_of_table(pickup)
     return Recipe(
         name=_checked(str, table.get("name", "unnamed"), "name"),
@@ -136,6 +144,13 @@ def recipe_of_table(table: Mapping[str, Any]) -> Recipe:
         splice=build(Splice, _table(tonearm, "splice"), "[tonearm.splice]"),
         smoother=_chosen(_SMOOTHERS, _SMOOTHER, _table(tonearm, "smoother"), "[tonearm.smoother]"),
         passband=_checked(float, preamp.get("passband", DEFAULT_PASSBAND), "[preamp] passband"),
+        repair=Repair(
+            **{
+                name: build(kind, _table(preamp, name), f"[preamp.{name}]")
+                for name, kind in _REPAIRS.items()
+                if name in preamp
+            }
+        ),
     )
 
 
@@ -154,8 +169,25 @@ def table_of_recipe(recipe: Recipe) -> dict[str, Any]:
         "about": recipe.about,
         "pickup": {"cartridge": recipe.cartridge, **pickup},
         "tonearm": {"splice": asdict(recipe.splice), "smoother": _table_of_chosen(_SMOOTHERS, recipe.smoother)},
-        "preamp": {"passband": recipe.passband},
+        "preamp": {"passband": recipe.passband, **_table_of_repair(recipe.repair)},
     }
+
+
+def _table_of_repair(repair: Repair) -> dict[str, Any]:
+    return {name: asdict(part) for name in _REPAIRS if (part := getattr(repair, name)) is not None}
+
+
+def with_repairs(recipe: Recipe, *, declick: bool, decrackle: bool, rumble_hz: float | None) -> Recipe:
+    """Return the recipe with repairs added, where it has none of its own, as they come; ArgumentError for a bad corner."""
+    own = recipe.repair
+    return replace(
+        recipe,
+        repair=Repair(
+            declick=own.declick or (Declicker() if declick else None),
+            decrackle=own.decrackle or (Decrackler() if decrackle else None),
+            rumble=own.rumble if rumble_hz is None else RumbleFilter(corner_hz=rumble_hz),
+        ),
+    )
 
 
 def _parameters(kind: type[Any]) -> tuple[str, ...]:

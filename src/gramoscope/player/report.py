@@ -12,10 +12,11 @@ from gramoscope.pickup.cartridge import Pickup
 from gramoscope.player.monitor import Monitor
 from gramoscope.player.provenance import InputHashes, bench_of, command_line, recipe_of, versions
 from gramoscope.player.recipe import Recipe
-from gramoscope.player.tracks import EQUALISED
+from gramoscope.player.tracks import EQUALISED, FLAT, REPAIRED
 from gramoscope.quality import Quality, describe
 
 if TYPE_CHECKING:
+    from gramoscope.player.outputs import Outputs
     from gramoscope.player.play import Settings
 
 REPORT_FORMAT = "gramoscope-report/1"
@@ -28,11 +29,13 @@ def transfer_report(
     settings: Settings,
     hashes: InputHashes,
     monitor: Monitor,
-    files: Mapping[str, Mapping[str, Any]],
+    outputs: Outputs,
     elapsed_s: float,
 ) -> dict[str, Any]:
     """Return the report of a transfer as plain numbers, texts, lists and dicts."""
-    seconds = monitor.samples / settings.rate_hz
+    seconds, files = monitor.samples / settings.rate_hz, outputs.complete()
+    repair = None if outputs.cues is None else outputs.cues.as_dict(recipe.repair)
+    equalised = {"characteristic": settings.characteristic_name, "made_of": (FLAT if repair is None else REPAIRED).name}
     return {
         "format": REPORT_FORMAT,
         "made": settings.catalogue.made.isoformat(timespec="seconds"),
@@ -49,8 +52,9 @@ def transfer_report(
         **monitor.as_dict(),
         "files": {
             **files,
-            EQUALISED.name: {**files[EQUALISED.name], "characteristic": settings.characteristic_name},
+            EQUALISED.name: {**files[EQUALISED.name], **equalised},
         },
+        "repair": repair,
         "flags": {str(flag.name).lower(): describe(flag) for flag in Quality},
         "capture_problems": list(capture.problems),
         "recipe": recipe_of(recipe),
