@@ -21,6 +21,8 @@ def play(
     rate: int = 96_000,
     characteristic: str | None = None,
     flac: bool = False,
+    rpm: str | None = None,
+    speed_curve: Path | None = None,
     full_scale_cm_s: Annotated[float, FINITE] = 50.0,
     title: str = "",
     originator: str = "",
@@ -53,6 +55,12 @@ def play(
         says when left out, riaa (as in the paper) if it does not.
     flac
         Write every sound as FLAC too: the same samples in about half the room.
+    rpm
+        The speed at which the record was meant to turn: a number, or 78-us (78.26), 78-europe (77.92), 76-us (76.60), 80, 45,
+        33-third (or 33⅓), 16-two-thirds, pathe (90). As the capture says when left out.
+    speed_curve
+        CSV file with the header `time_s,rpm`: the speed over time, in the seconds of the sound that comes out; straight
+        lines between the rows, the same before the first and after the last. In place of `--rpm`.
     full_scale_cm_s
         Groove velocity at full scale (0 dBFS). The same for all files and for quiet and loud records alike: nothing is
         normalised. What lies beyond is clipped, counted and told.
@@ -77,12 +85,14 @@ def play(
     from gramoscope.player.play import Settings
     from gramoscope.player.play import play as play_capture
     from gramoscope.player.recipe import load_recipe
+    from gramoscope.player.speed import Speed
 
     terminal = Terminal(quiet, json)
     opened = open_capture(capture)
     name = characteristic or opened.bench.disc.characteristic or "riaa"
     catalogue = Catalogue(title=title, originator=originator, reference=reference, description=description)
-    settings = Settings(float(rate), name, workers, full_scale_cm_s / 100, flac, catalogue)
+    speed = Speed.chosen(rpm, speed_curve)
+    settings = Settings(float(rate), name, workers, full_scale_cm_s / 100, flac, catalogue, speed)
     with terminal.progress("Playing") as progress:
         report = play_capture(opened, load_recipe(recipe), out, settings, progress=progress)
     terminal.result(report)
@@ -95,6 +105,7 @@ def tell(terminal: Terminal, report: Mapping[str, Any], out: Path) -> None:
     noise, share, level = report["noise_estimate"], report["share"], report["level"]
     rows = {
         "played": f"{report['seconds']:.3f} s in {report['elapsed_s']:.1f} s, recipe {report['recipe'].get('name', '?')}",
+        "speed": _speed(report["speed"]),
         "groups": _groups(report),
         "measured": f"{share['measured']:.1%} of the sound; {share['interpolated']:.1%} interpolated and flagged",
         "level": f"{level['rms_cm_s']:.2f} cm/s rms, {level['peak_cm_s']:.1f} cm/s peak",
@@ -115,6 +126,12 @@ def tell(terminal: Terminal, report: Mapping[str, Any], out: Path) -> None:
 def _names(report: Mapping[str, Any]) -> list[str]:
     sounds = [[name, *([file["flac"]["name"]] if "flac" in file else [])] for name, file in report["files"].items()]
     return [*(name for names in sounds for name in names), "groove.png", "report.json"]
+
+
+def _speed(speed: Mapping[str, Any]) -> str:
+    if speed["curve"] is not None:
+        return f"{min(speed['curve']['rpm']):g} to {max(speed['curve']['rpm']):g} rpm, as {speed['chosen']} says"
+    return f"{speed['rpm']:.5g} rpm" + (f"; the capture says {speed['capture_rpm']:g}" if speed["chosen"] else "")
 
 
 def _groups(report: Mapping[str, Any]) -> str:

@@ -29,6 +29,7 @@ from gramoscope.player.picture import groove_picture
 from gramoscope.player.provenance import InputHashes, hash_group
 from gramoscope.player.recipe import Recipe
 from gramoscope.player.report import transfer_report
+from gramoscope.player.speed import Speed
 from gramoscope.player.tracks import EQUALISED, FLAT, TRACKS, VERTICAL, WALLS, alone, vertical
 from gramoscope.player.workers import in_order, spreading
 from gramoscope.preamp.equalisation import Equaliser
@@ -63,6 +64,8 @@ class Settings:
         Write every sound as FLAC too.
     catalogue : Catalogue
         The archive's words.
+    speed : Speed
+        How fast the record shall turn.
     """
 
     rate_hz: float = 96_000.0
@@ -71,6 +74,7 @@ class Settings:
     full_scale_m_s: float = FULL_SCALE_M_S
     flac: bool = False
     catalogue: Catalogue = field(default_factory=Catalogue)
+    speed: Speed = field(default_factory=Speed)
 
     def __post_init__(self) -> None:
         possible = 1000 <= self.rate_hz <= 1_000_000 and self.rate_hz == round(self.rate_hz)
@@ -120,10 +124,11 @@ def play(
     """
     started = time.perf_counter()
     bench, direction = capture.bench, direction_of_cut(capture.bench.disc.cut)
+    rotation = settings.speed.rotation_of(bench.rotation)
     equaliser = Equaliser(characteristic(settings.characteristic_name))
-    tonearm = Tonearm(bench.rotation, direction, bench.disc.wall_angle_rad, bench.passage_length_m, recipe.smoother)
-    resampler = Resampler(bench.rotation, settings.rate_hz, recipe.passband)
-    hashes, monitor = InputHashes(), _monitor(capture, settings.rate_hz)
+    tonearm = Tonearm(rotation, direction, bench.disc.wall_angle_rad, bench.passage_length_m, recipe.smoother)
+    resampler = Resampler(rotation, settings.rate_hz, recipe.passband)
+    hashes, monitor = InputHashes(), _monitor(capture, settings)
 
     with _outputs(capture, recipe, folder, settings) as files:
         pickup = learned(capture, recipe, settings.workers, progress=progress)
@@ -199,8 +204,9 @@ def _outputs(capture: Capture, recipe: Recipe, folder: Path, settings: Settings)
     return Outputs(folder, tracks, rate_hz=settings.rate_hz, full_scale_m_s=settings.full_scale_m_s, flac=settings.flac)
 
 
-def _monitor(capture: Capture, rate_hz: float) -> Monitor:
-    samples = float(capture.bench.rotation.time_of_arc_s(capture.bench.passage_length_m)) * rate_hz
+def _monitor(capture: Capture, settings: Settings) -> Monitor:
+    rotation = settings.speed.rotation_of(capture.bench.rotation)
+    samples = float(rotation.time_of_arc_s(capture.bench.passage_length_m)) * settings.rate_hz
     monitor = Monitor()
     monitor.overview.samples_per_point = max(1, int(np.ceil(samples / OVERVIEW_POINTS)))
     return monitor

@@ -42,6 +42,7 @@ def transfer_report(
         "layout": capture.layout,
         "seconds": seconds,
         "rate_hz": settings.rate_hz,
+        "speed": settings.speed.as_dict(capture.bench.rotation),
         "direction": direction_of_cut(capture.bench.disc.cut),
         "walls_read": list(pickup.walls),
         "remarks": [*_remarks(capture, pickup.walls), *_clipped(files)],
