@@ -23,6 +23,7 @@ def play(
     flac: bool = False,
     rpm: str | None = None,
     speed_curve: Path | None = None,
+    remove_wow: bool = False,
     full_scale_cm_s: Annotated[float, FINITE] = 50.0,
     title: str = "",
     originator: str = "",
@@ -61,6 +62,9 @@ def play(
     speed_curve
         CSV file with the header `time_s,rpm`: the speed over time, in the seconds of the sound that comes out; straight
         lines between the rows, the same before the first and after the last. In place of `--rpm`.
+    remove_wow
+        Measure how far the hole is off centre, and remove its wow if that is sure; the passage must cover most of a turn. A
+        survey of the passage comes first and takes time. Without it the wow is measured and told, and nothing is done.
     full_scale_cm_s
         Groove velocity at full scale (0 dBFS). The same for all files and for quiet and loud records alike: nothing is
         normalised. What lies beyond is clipped, counted and told.
@@ -91,7 +95,7 @@ def play(
     opened = open_capture(capture)
     name = characteristic or opened.bench.disc.characteristic or "riaa"
     catalogue = Catalogue(title=title, originator=originator, reference=reference, description=description)
-    speed = Speed.chosen(rpm, speed_curve)
+    speed = Speed.chosen(rpm, speed_curve, remove_wow=remove_wow)
     settings = Settings(float(rate), name, workers, full_scale_cm_s / 100, flac, catalogue, speed)
     with terminal.progress("Playing") as progress:
         report = play_capture(opened, load_recipe(recipe), out, settings, progress=progress)
@@ -114,6 +118,8 @@ def tell(terminal: Terminal, report: Mapping[str, Any], out: Path) -> None:
         "files": "  ".join(str(out / name) for name in _names(report)),
     }
     terminal.table(rows)
+    for hint in filter(None, (hint.get("words") for hint in report["hints"].values())):
+        terminal.say(f"[yellow]Hint:[/] {hint}")
     for remark in report["remarks"]:
         terminal.say(f"[yellow]Note:[/] {remark}")
     for problem in report["problems"][:5]:

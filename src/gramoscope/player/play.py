@@ -23,6 +23,8 @@ from gramoscope.listening.broadcast_wave import FULL_SCALE_M_S
 from gramoscope.listening.flac import HIGHEST_RATE_HZ as HIGHEST_FLAC_RATE_HZ
 from gramoscope.pickup.cartridge import Pickup
 from gramoscope.player.catalogue import Catalogue, metadata_of
+from gramoscope.player.centring import surveyed
+from gramoscope.player.hints import Hints
 from gramoscope.player.monitor import OVERVIEW_POINTS, Monitor
 from gramoscope.player.outputs import Outputs
 from gramoscope.player.picture import groove_picture
@@ -37,6 +39,7 @@ from gramoscope.preamp.resample import Resampler
 from gramoscope.preamp.walls import WallSplitter, in_direction
 from gramoscope.signal_path import Audio, WallTrace
 from gramoscope.tonearm.follow import Tonearm
+from gramoscope.turntable.hole_gauge import HoleGauge
 
 
 class Progress(Protocol):
@@ -132,8 +135,9 @@ def play(
 
     with _outputs(capture, recipe, folder, settings) as files:
         pickup = learned(capture, recipe, settings.workers, progress=progress)
+        centring = surveyed(capture, pickup, settings.workers, asked=settings.speed.remove_wow)
         traces = _picked_up(capture, pickup, settings.workers, hashes, monitor, progress)
-        motion = tonearm.follow(_spliced(traces, recipe, monitor))
+        motion = tonearm.follow(_spliced(centring.centred(traces), recipe, monitor))
         sound = files.kept(WALLS, resampler.resample(motion), WallSplitter(direction, pickup.walls).split)
         sound = files.kept(VERTICAL, sound, vertical)
         flat = files.kept(FLAT, _heard((in_direction(piece, direction) for piece in sound), monitor), alone)
@@ -141,7 +145,15 @@ def play(
             pass
         _require_sound(monitor)
         report = transfer_report(
-            capture, recipe, pickup, settings, hashes, monitor, files.complete(), time.perf_counter() - started
+            capture,
+            recipe,
+            pickup,
+            settings,
+            hashes,
+            monitor,
+            centring,
+            files.complete(),
+            time.perf_counter() - started,
         )
         picture = groove_picture(capture, pickup, monitor, rate_hz=settings.rate_hz, recipe_name=recipe.name)
         files.finish(report, picture)
@@ -188,7 +200,7 @@ def _picked_up(
 
 def _spliced(traces: Iterator[WallTrace], recipe: Recipe, monitor: Monitor) -> Iterator[WallTrace]:
     for trace, match in recipe.splice.join(traces):
-        monitor.spliced(match)
+        monitor.spliced(match, trace)
         yield trace
 
 
@@ -207,7 +219,7 @@ def _outputs(capture: Capture, recipe: Recipe, folder: Path, settings: Settings)
 def _monitor(capture: Capture, settings: Settings) -> Monitor:
     rotation = settings.speed.rotation_of(capture.bench.rotation)
     samples = float(rotation.time_of_arc_s(capture.bench.passage_length_m)) * settings.rate_hz
-    monitor = Monitor()
+    monitor = Monitor(HoleGauge(capture.bench.rotation), Hints(rotation.rpm, settings.rate_hz))
     monitor.overview.samples_per_point = max(1, int(np.ceil(samples / OVERVIEW_POINTS)))
     return monitor
 
