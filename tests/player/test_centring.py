@@ -25,9 +25,7 @@ def _trace(number: int, hole: OffCentreHole) -> WallTrace:
     place = SPIRAL.radius_m - float(hole.distance_m(number * STEP_M)) + noise
     offset = np.full((2, 5), place) + np.array([[60e-6], [-60e-6]])
     nothing = np.full((2, 5), np.nan)
-    return WallTrace(
-        number, number * STEP_M, 1e-6, offset, nothing, nothing, nothing, 1.0, np.zeros((2, 5), np.uint16)
-    )
+    return WallTrace(number, number * STEP_M, 1e-6, offset, nothing, nothing, nothing, 1.0, np.zeros((2, 5), np.uint16))
 
 
 def _surveyed(hole: OffCentreHole, *, groups: int = 4000, asked: bool = True) -> tuple[Centring, list[int]]:

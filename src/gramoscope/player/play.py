@@ -144,17 +144,8 @@ def play(
         for _ in files.kept(EQUALISED, equaliser.equalise(flat), alone):
             pass
         _require_sound(monitor)
-        report = transfer_report(
-            capture,
-            recipe,
-            pickup,
-            settings,
-            hashes,
-            monitor,
-            centring,
-            files.complete(),
-            time.perf_counter() - started,
-        )
+        sounds, elapsed_s = files.complete(), time.perf_counter() - started
+        report = transfer_report(capture, recipe, pickup, settings, hashes, monitor, centring, sounds, elapsed_s)
         picture = groove_picture(capture, pickup, monitor, rate_hz=settings.rate_hz, recipe_name=recipe.name)
         files.finish(report, picture)
     return report

@@ -105,6 +105,7 @@ class HoleGauge:
     _first_turn: float = np.inf
     _last_turn: float = -np.inf
     _before_m: float = np.nan
+    _before_rad: float = np.nan
 
     def see(self, trace: WallTrace, step_error_m: float = np.nan) -> None:
         """Take note of a stretch.
@@ -117,10 +118,11 @@ class HoleGauge:
             By how much farther than nominal it lies from the one before, by their overlap; NaN when that is not known.
         """
         angle = float(self.rotation.angle_of_arc_rad(trace.arc_start_m))
-        step_m, self._before_m = trace.arc_start_m - self._before_m, trace.arc_start_m
+        step_m, step_rad = trace.arc_start_m - self._before_m, angle - self._before_rad
+        self._before_m, self._before_rad = trace.arc_start_m, angle
         if np.isfinite(step_error_m) and step_m > 0:
             # the middle of the step, which is what the difference of two places speaks of
-            middle = angle - step_m / self.rotation.radius_m / 2
+            middle = angle - step_rad / 2
             row = np.array([[1.0, np.cos(middle), np.sin(middle)]])
             self._steps.add(middle / (2 * np.pi), row, np.array([step_error_m / step_m]))
         usable = np.isfinite(trace.offset_m) & ((trace.flags & np.uint16(NOT_MEASURED)) == 0)
@@ -129,7 +131,7 @@ class HoleGauge:
             self._see_wall(int(wall), angle, trace, float(samples.mean()), float(trace.offset_m[wall, samples].mean()))
 
     def _see_wall(self, wall: int, angle: float, trace: WallTrace, middle: float, place_m: float) -> None:
-        angle += middle * trace.arc_step_m / self.rotation.radius_m
+        angle += middle * trace.arc_step_m / float(self.rotation.radius_at_m(trace.arc_start_m))
         turn = angle / (2 * np.pi)
         self._first_turn, self._last_turn = min(self._first_turn, turn), max(self._last_turn, turn)
         row = np.array([[wall == 0, wall == 1, turn, np.cos(angle), np.sin(angle)]], np.float64)
