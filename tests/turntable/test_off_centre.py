@@ -125,6 +125,16 @@ def test_too_small_a_part_of_a_turn_is_not_determined_and_says_why():
     assert gauged([]).reason is not None
 
 
+def test_what_is_far_too_large_for_a_hole_is_not_one():
+    """Half the radius would be an error of the caller's; a log that was read wrongly is not."""
+    starts = np.arange(0, 1.2 * 2 * np.pi * SPIRAL.radius_m, 3e-3)
+    swing = -12e-3 * np.cos(SPIRAL.angle_of_arc_rad(starts + 6 * 93e-6))
+    found = gauged(trace(k, start, np.full((2, 13), swing[k])) for k, start in enumerate(starts))
+    assert found.reason is not None
+    assert "no hole" in found.reason
+    assert not found.significant
+
+
 def test_a_centred_record_has_nothing_to_remove():
     found = gauged(traces_of(OffCentreHole(SPIRAL, 0.0), turns=3.2, seed=5))
     assert found.reason is None

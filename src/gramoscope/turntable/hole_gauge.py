@@ -31,6 +31,8 @@ LEAST_TURNS = 0.75
 """Less of a turn looks like a bend of the spiral."""
 LARGEST_WOW_SIGMA = 1e-3
 """An amplitude that is known no better than this share of the radius, 0.1 % of the speed, is not called known."""
+LARGEST_WOW = 0.1
+"""No hole is farther off, as a share of the radius: what looks like that is a stage that was read wrongly."""
 LEAST_SIGMAS = 3.0
 """An amplitude below so many of its standard errors is not worth removing."""
 
@@ -162,7 +164,7 @@ class HoleGauge:
             pitch_sigma_m=float(np.sqrt(covariance[2, 2])),
             step_wow=float(along @ step[1:]),
             step_wow_sigma=float(np.sqrt(along @ step_covariance[1:, 1:] @ along)),
-            reason=self._reason(spread, radius),
+            reason=self._reason(amplitude, spread, radius),
         )
 
     def _mean_radius_m(self) -> float:
@@ -171,7 +173,7 @@ class HoleGauge:
         middle = np.pi * (self._first_turn + self._last_turn)
         return float(self.rotation.radius_at_m(self.rotation.arc_of_angle_m(middle)))
 
-    def _reason(self, spread: FloatArray, radius_m: float) -> str | None:
+    def _reason(self, amplitude_m: float, spread: FloatArray, radius_m: float) -> str | None:
         if self.turns < LEAST_TURNS:
             return f"the passage covers {self.turns:.3g} of a turn; {LEAST_TURNS:g} are needed"
         if not np.isfinite(spread).all():
@@ -179,6 +181,8 @@ class HoleGauge:
         worst = float(np.sqrt(np.linalg.eigvalsh(spread)[-1]))
         if worst > LARGEST_WOW_SIGMA * radius_m:
             return f"the amplitude is known to {worst * 1e6:.3g} µm only, {100 * worst / radius_m:.2g} % of the radius"
+        if amplitude_m > LARGEST_WOW * radius_m:
+            return f"an amplitude of {amplitude_m * 1e3:.3g} mm is no hole; see whether stage_um is right"
         return None
 
 
