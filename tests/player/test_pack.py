@@ -27,6 +27,7 @@ from gramoscope.disc.formats import Disc
 from gramoscope.errors import GramoscopeError, OutputError, TransferError
 from gramoscope.player import pack as pack_module
 from gramoscope.player.catalogue import Catalogue, metadata_of
+from gramoscope.player.centring import Centring
 from gramoscope.player.monitor import Monitor
 from gramoscope.player.outputs import Outputs
 from gramoscope.player.pack import BagLabel, pack
@@ -75,7 +76,7 @@ def _transfer(
                 pass
         pickup: Any = SimpleNamespace(walls=("inner", "outer"), calibration={})
         anything: Any = capture
-        report = transfer_report(anything, recipe, pickup, settings, InputHashes(), monitor, files, elapsed_s=1.0)
+        report = transfer_report(anything, recipe, pickup, settings, InputHashes(), monitor, Centring(), files, 1.0)
         files.finish(report, Figure(figsize=(1, 1)))
     return folder
 

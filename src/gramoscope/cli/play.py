@@ -24,6 +24,9 @@ def play(
     decrackle: bool = False,
     rumble_hz: Annotated[float | None, FINITE] = None,
     flac: bool = False,
+    rpm: str | None = None,
+    speed_curve: Path | None = None,
+    remove_wow: bool = False,
     full_scale_cm_s: Annotated[float, FINITE] = 50.0,
     title: str = "",
     originator: str = "",
@@ -66,6 +69,15 @@ def play(
         Take off what lies below so many hertz, say 20.
     flac
         Write every sound as FLAC too: the same samples in about half the room.
+    rpm
+        The speed at which the record was meant to turn: a number, or 78-us (78.26), 78-europe (77.92), 76-us (76.60), 80, 45,
+        33-third (or 33⅓), 16-two-thirds, pathe (90). As the capture says when left out.
+    speed_curve
+        CSV file with the header `time_s,rpm`: the speed over time, in the seconds of the sound that comes out; straight
+        lines between the rows, the same before the first and after the last. In place of `--rpm`.
+    remove_wow
+        Measure how far the hole is off centre, and remove its wow if that is sure; the passage must cover most of a turn. A
+        survey of the passage comes first and takes time. Without it the wow is measured and told, and nothing is done.
     full_scale_cm_s
         Groove velocity at full scale (0 dBFS). The same for all files and for quiet and loud records alike: nothing is
         normalised. What lies beyond is clipped, counted and told.
@@ -90,13 +102,15 @@ def play(
     from gramoscope.player.play import Settings
     from gramoscope.player.play import play as play_capture
     from gramoscope.player.recipe import load_recipe, with_repairs
+    from gramoscope.player.speed import Speed
 
     terminal = Terminal(quiet, json)
     opened = open_capture(capture)
     name = characteristic or opened.bench.disc.characteristic or "riaa"
     catalogue = Catalogue(title=title, originator=originator, reference=reference, description=description)
-    settings = Settings(float(rate), name, workers, full_scale_cm_s / 100, flac, catalogue)
     chosen = with_repairs(load_recipe(recipe), declick=declick, decrackle=decrackle, rumble_hz=rumble_hz)
+    speed = Speed.chosen(rpm, speed_curve, remove_wow=remove_wow)
+    settings = Settings(float(rate), name, workers, full_scale_cm_s / 100, flac, catalogue, speed)
     with terminal.progress("Playing") as progress:
         report = play_capture(opened, chosen, out, settings, progress=progress)
     terminal.result(report)
@@ -109,6 +123,7 @@ def tell(terminal: Terminal, report: Mapping[str, Any], out: Path) -> None:
     noise, share, level = report["noise_estimate"], report["share"], report["level"]
     rows = {
         "played": f"{report['seconds']:.3f} s in {report['elapsed_s']:.1f} s, recipe {report['recipe'].get('name', '?')}",
+        "speed": _speed(report["speed"]),
         "groups": _groups(report),
         "measured": f"{share['measured']:.1%} of the sound; {share['interpolated']:.1%} interpolated and flagged",
         "level": f"{level['rms_cm_s']:.2f} cm/s rms, {level['peak_cm_s']:.1f} cm/s peak",
@@ -118,6 +133,8 @@ def tell(terminal: Terminal, report: Mapping[str, Any], out: Path) -> None:
         "files": "  ".join(str(out / name) for name in _names(report)),
     }
     terminal.table(rows)
+    for hint in filter(None, (hint.get("words") for hint in report["hints"].values())):
+        terminal.say(f"[yellow]Hint:[/] {hint}")
     for remark in report["remarks"]:
         terminal.say(f"[yellow]Note:[/] {remark}")
     for problem in report["problems"][:5]:
@@ -138,6 +155,12 @@ def _repairs(report: Mapping[str, Any]) -> str:
     spans, seconds = report["repair"]["spans"], report["repair"]["seconds"]
     told = [f"{several(number, 'span')} by {kind} ({seconds[kind] * 1e3:.1f} ms)" for kind, number in spans.items()]
     return "; ".join(told) or "nothing was found"
+
+
+def _speed(speed: Mapping[str, Any]) -> str:
+    if speed["curve"] is not None:
+        return f"{min(speed['curve']['rpm']):g} to {max(speed['curve']['rpm']):g} rpm, as {speed['chosen']} says"
+    return f"{speed['rpm']:.5g} rpm" + (f"; the capture says {speed['capture_rpm']:g}" if speed["chosen"] else "")
 
 
 def _groups(report: Mapping[str, Any]) -> str:

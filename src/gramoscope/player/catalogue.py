@@ -64,9 +64,10 @@ def metadata_of(
     title = words.title or disc.notes.get("title", "")
     reference = words.reference or ascii_text(capture_name)[:REFERENCE]
     description = _description(words.description or record_in_words(title, disc.notes), track, settings)
-    medium = f"gramophone record; {bench.rotation.rpm:g} rpm; {disc.cut} cut"
+    medium = f"gramophone record; {settings.speed.rotation_of(bench.rotation).in_words()}; {disc.cut} cut"
     steps = track.done(settings, recipe)
-    done = f"{program}; optical; recipe {recipe.name}; {steps}; full scale {settings.full_scale_m_s:g} m/s"
+    told = (f"recipe {recipe.name}", settings.speed.done(bench.rotation), steps)
+    done = "; ".join([program, "optical", *filter(None, told), f"full scale {settings.full_scale_m_s:g} m/s"])
     mode = "mono" if len(track.channels) == 1 else "dual-mono"
     made = words.made.astimezone(UTC)
     label = " ".join(disc.notes[name] for name in ("label", "matrix", "side") if name in disc.notes)

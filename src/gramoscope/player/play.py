@@ -24,12 +24,15 @@ from gramoscope.listening.broadcast_wave import FULL_SCALE_M_S
 from gramoscope.listening.flac import HIGHEST_RATE_HZ as HIGHEST_FLAC_RATE_HZ
 from gramoscope.pickup.cartridge import Pickup
 from gramoscope.player.catalogue import Catalogue, metadata_of
+from gramoscope.player.centring import surveyed
+from gramoscope.player.hints import Hints
 from gramoscope.player.monitor import OVERVIEW_POINTS, Monitor
 from gramoscope.player.outputs import Outputs
 from gramoscope.player.picture import groove_picture
 from gramoscope.player.provenance import InputHashes, hash_group
 from gramoscope.player.recipe import Recipe
 from gramoscope.player.report import transfer_report
+from gramoscope.player.speed import Speed
 from gramoscope.player.tracks import (
     DIFFERENCE,
     EQUALISED,
@@ -49,6 +52,7 @@ from gramoscope.preamp.resample import Resampler
 from gramoscope.preamp.walls import WallSplitter, in_direction
 from gramoscope.signal_path import Audio, WallTrace
 from gramoscope.tonearm.follow import Tonearm
+from gramoscope.turntable.hole_gauge import HoleGauge
 
 
 class Progress(Protocol):
@@ -76,6 +80,8 @@ class Settings:
         Write every sound as FLAC too.
     catalogue : Catalogue
         The archive's words.
+    speed : Speed
+        How fast the record shall turn.
     """
 
     rate_hz: float = 96_000.0
@@ -84,6 +90,7 @@ class Settings:
     full_scale_m_s: float = FULL_SCALE_M_S
     flac: bool = False
     catalogue: Catalogue = field(default_factory=Catalogue)
+    speed: Speed = field(default_factory=Speed)
 
     def __post_init__(self) -> None:
         possible = 1000 <= self.rate_hz <= 1_000_000 and self.rate_hz == round(self.rate_hz)
@@ -133,24 +140,25 @@ def play(
     """
     started = time.perf_counter()
     bench, direction = capture.bench, direction_of_cut(capture.bench.disc.cut)
+    rotation = settings.speed.rotation_of(bench.rotation)
     equaliser = Equaliser(characteristic(settings.characteristic_name))
-    tonearm = Tonearm(bench.rotation, direction, bench.disc.wall_angle_rad, bench.passage_length_m, recipe.smoother)
-    resampler = Resampler(bench.rotation, settings.rate_hz, recipe.passband)
-    hashes, monitor = InputHashes(), _monitor(capture, settings.rate_hz)
+    tonearm = Tonearm(rotation, direction, bench.disc.wall_angle_rad, bench.passage_length_m, recipe.smoother)
+    resampler = Resampler(rotation, settings.rate_hz, recipe.passband)
+    hashes, monitor = InputHashes(), _monitor(capture, settings)
 
     with _outputs(capture, recipe, folder, settings) as files:
         pickup = learned(capture, recipe, settings.workers, progress=progress)
+        centring = surveyed(capture, pickup, settings.workers, asked=settings.speed.remove_wow)
         traces = _picked_up(capture, pickup, settings.workers, hashes, monitor, progress)
-        motion = tonearm.follow(_spliced(traces, recipe, monitor))
+        motion = tonearm.follow(_spliced(centring.centred(traces), recipe, monitor))
         sound = files.kept(WALLS, resampler.resample(motion), WallSplitter(direction, pickup.walls).split)
         sound = files.kept(VERTICAL, sound, vertical)
         flat = files.kept(FLAT, _heard((in_direction(piece, direction) for piece in sound), monitor), alone)
         for _ in files.kept(EQUALISED, equaliser.equalise(_repaired(flat, recipe, files, settings)), alone):
             pass
         _require_sound(monitor)
-        report = transfer_report(
-            capture, recipe, pickup, settings, hashes, monitor, files, time.perf_counter() - started
-        )
+        elapsed_s = time.perf_counter() - started
+        report = transfer_report(capture, recipe, pickup, settings, hashes, monitor, centring, files, elapsed_s)
         picture = groove_picture(capture, pickup, monitor, rate_hz=settings.rate_hz, recipe_name=recipe.name)
         files.finish(report, picture)
     return report
@@ -196,7 +204,7 @@ def _picked_up(
 
 def _spliced(traces: Iterator[WallTrace], recipe: Recipe, monitor: Monitor) -> Iterator[WallTrace]:
     for trace, match in recipe.splice.join(traces):
-        monitor.spliced(match)
+        monitor.spliced(match, trace)
         yield trace
 
 
@@ -225,9 +233,10 @@ def _outputs(capture: Capture, recipe: Recipe, folder: Path, settings: Settings)
     return Outputs(folder, tracks, rate_hz=settings.rate_hz, full_scale_m_s=settings.full_scale_m_s, flac=settings.flac)
 
 
-def _monitor(capture: Capture, rate_hz: float) -> Monitor:
-    samples = float(capture.bench.rotation.time_of_arc_s(capture.bench.passage_length_m)) * rate_hz
-    monitor = Monitor()
+def _monitor(capture: Capture, settings: Settings) -> Monitor:
+    rotation = settings.speed.rotation_of(capture.bench.rotation)
+    samples = float(rotation.time_of_arc_s(capture.bench.passage_length_m)) * settings.rate_hz
+    monitor = Monitor(HoleGauge(capture.bench.rotation), Hints(rotation.rpm, settings.rate_hz))
     monitor.overview.samples_per_point = max(1, int(np.ceil(samples / OVERVIEW_POINTS)))
     return monitor
 

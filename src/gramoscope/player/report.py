@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 from gramoscope.apparatus.capture import Capture
 from gramoscope.disc.formats import direction_of_cut
 from gramoscope.pickup.cartridge import Pickup
+from gramoscope.player.centring import Centring
 from gramoscope.player.monitor import Monitor
 from gramoscope.player.provenance import InputHashes, bench_of, command_line, recipe_of, versions
 from gramoscope.player.recipe import Recipe
 from gramoscope.player.tracks import EQUALISED, FLAT, REPAIRED
 from gramoscope.quality import Quality, describe
+from gramoscope.turntable.hole_gauge import HoleGauge
 
 if TYPE_CHECKING:
     from gramoscope.player.outputs import Outputs
@@ -29,6 +31,7 @@ def transfer_report(
     settings: Settings,
     hashes: InputHashes,
     monitor: Monitor,
+    centring: Centring,
     outputs: Outputs,
     elapsed_s: float,
 ) -> dict[str, Any]:
@@ -36,6 +39,8 @@ def transfer_report(
     seconds, files = monitor.samples / settings.rate_hz, outputs.complete()
     repair = None if outputs.cues is None else outputs.cues.as_dict(recipe.repair)
     equalised = {"characteristic": settings.characteristic_name, "made_of": (FLAT if repair is None else REPAIRED).name}
+    gauge = monitor.gauge or HoleGauge(capture.bench.rotation)
+    hole = gauge.finding()
     return {
         "format": REPORT_FORMAT,
         "made": settings.catalogue.made.isoformat(timespec="seconds"),
@@ -45,9 +50,12 @@ def transfer_report(
         "layout": capture.layout,
         "seconds": seconds,
         "rate_hz": settings.rate_hz,
+        "speed": settings.speed.as_dict(capture.bench.rotation),
+        "wow": centring.as_dict(hole),
+        "hints": monitor.hints.as_dict() if monitor.hints else {},
         "direction": direction_of_cut(capture.bench.disc.cut),
         "walls_read": list(pickup.walls),
-        "remarks": [*_remarks(capture, pickup.walls), *_clipped(files)],
+        "remarks": [*_remarks(capture, pickup.walls), *centring.remarks(hole), *_clipped(files)],
         "calibration": dict(pickup.calibration),
         **monitor.as_dict(),
         "files": {

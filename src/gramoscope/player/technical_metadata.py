@@ -25,7 +25,7 @@ _UNTOLD = {
     "Cracks": "a crack is not told from a chip or from dust; where a wall was not seen is counted as groove damage",
     "Delamination": "the surface of the disc was not looked at",
     "Centre start disc": "a film does not tell where the record starts",
-    "Incorrect speed": "the playing speed is what the capture says; the recording was not asked",
+    "Incorrect speed": "the playing speed is what the capture or whoever played it says; hints of the sound are in report.json",
     "Surface noise": "the error bars (see quality) are those of the reading; noise of the record is part of the sound",
 }
 
@@ -43,13 +43,13 @@ def technical_metadata(transfer: Transfer) -> dict[str, Any]:
         Plain values. The page docs/reference/package.md has every key.
     """
     report = transfer.report
-    disc, rotation = report["bench"]["disc"], report["bench"]["rotation"]
+    disc = report["bench"]["disc"]
     title = report["catalogue"].get("title") or disc["notes"].get("title", "")
     sizes = {file.name: file.size_bytes for file in transfer.files}
     return {
         "format": PACKAGE_FORMAT,
         "bibliographic": {**disc["notes"], **({"title": title} if title else {})},
-        "playingSpeed": _measure(rotation["rpm"], "rpm"),
+        "playingSpeed": _measure(report["speed"]["rpm"], "rpm"),
         "grooveSize": _measure(_rounded(1e6 * disc["groove_width_m"]), "µm"),
         "grooveDirection": _DIRECTIONS[disc["cut"]],
         "recordingMethod": "analogue",
