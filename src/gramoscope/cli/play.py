@@ -49,8 +49,10 @@ def play(
     rate
         Samples a second.
     characteristic
-        Recording characteristic to undo in `equalised.wav`: riaa, flat, aes, nab, columbia-lp, european-78, … As the capture
-        says when left out, riaa (as in the paper) if it does not.
+        Recording characteristic to undo in `equalised.wav`: a name (riaa, flat, aes, decca-ffrr, …) or turnover in Hz, shelf
+        and roll-off in dB at 10 kHz, as collectors write them: 500N-16, 300R-12.7, 250N-0. `gramoscope characteristics` lists
+        names and letters, and looks up a label and a year. As the capture says when left out, riaa (as in the paper) if it
+        does not.
     flac
         Write every sound as FLAC too: the same samples in about half the room.
     full_scale_cm_s

@@ -29,7 +29,7 @@ class Support(Enum):
     """How well a curve is supported by what is known of a record, best first."""
 
     LABEL_AND_YEAR = "the label used it in that year"
-    LABEL = "the label used it; nobody said when"
+    LABEL = "the label used it; no year to compare"
     CUSTOM = "a custom of the time, whatever the label"
     OTHER_YEARS = "the label used it, but in other years"
 

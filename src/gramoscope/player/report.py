@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from gramoscope.apparatus.capture import Capture
+from gramoscope.disc.characteristics import characteristic
 from gramoscope.disc.formats import direction_of_cut
 from gramoscope.pickup.cartridge import Pickup
 from gramoscope.player.monitor import Monitor
@@ -49,7 +50,10 @@ def transfer_report(
         **monitor.as_dict(),
         "files": {
             **files,
-            EQUALISED.name: {**files[EQUALISED.name], "characteristic": settings.characteristic_name},
+            EQUALISED.name: {
+                **files[EQUALISED.name],
+                "characteristic": characteristic(settings.characteristic_name).name,
+            },
         },
         "flags": {str(flag.name).lower(): describe(flag) for flag in Quality},
         "capture_problems": list(capture.problems),
