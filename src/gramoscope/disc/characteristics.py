@@ -275,8 +275,8 @@ def _free_entry(turnover_hz: float, shelf_hz: float | None, shelf: str, rolloff_
     )
     require(
         shelf_hz is None or shelf_hz >= LOWEST_SHELF_HZ,
-        f"{notation}: a shelf at {shelf_hz:g} Hz",
-        f"{LOWEST_SHELF_HZ:g} Hz or more, or N for none",
+        f"{notation}: a shelf {shelf}",
+        f"a shelf at {LOWEST_SHELF_HZ:g} Hz or more, or N for none",
     )
     corner = rolloff_corner_hz(rolloff_db) if rolloff_db else None
     free = Characteristic(notation.lower(), notation, shelf_hz, turnover_hz or None, corner)
