@@ -102,11 +102,12 @@ def our_rows(*, cutting: bool) -> Iterator[list[str]]:
 
 
 def peer_rows() -> Iterator[list[str]]:
-    peers = [("sox", "riaa", sox, "riaa"), *(("ffmpeg", k, ffmpeg(k), name) for k, name in FFMPEG_TYPES.items())]
-    for program, effect, through, name in peers:
+    for name in ("riaa", *(name for name in FFMPEG_TYPES.values() if name != "riaa")):
         curve = characteristic(name)
-        for who, filter_ in ((f"{program} `{effect}`", through), ("ours", ours(curve, cutting=False)[0])):
-            yield [curve.title, who, *(_cell(filter_, curve, rate) for rate in RATES_HZ)]
+        filters = {"ours": ours(curve, cutting=False)[0], **({"sox `riaa`": sox} if name == "riaa" else {})}
+        filters |= {f"ffmpeg `{kind}`": ffmpeg(kind) for kind, theirs in FFMPEG_TYPES.items() if theirs == name}
+        for who, through in filters.items():
+            yield [curve.title, who, *(_cell(through, curve, rate) for rate in RATES_HZ)]
 
 
 def _cell(through: Filter, curve: Characteristic, rate_hz: int) -> str:
@@ -124,7 +125,7 @@ def page(playback: list[list[str]], cutting: list[list[str]], peers: list[list[s
         "    python -m benchmarks.accuracy.equalisation\n",
         f"Largest error of level in dB, 20 Hz … 20 kHz, of an impulse's spectrum against the analytic curve. "
         f"{version_of('sox')}; {version_of('ffmpeg')}.\n",
-        "What is left of ours is the bass limit of curves without a shelf (0.0027 dB at 20 Hz) and, at 44.1 kHz, the fit "
+        "What is left of ours is the bass limit of curves without a shelf (0.003 dB at 20 Hz) and, at 44.1 kHz, the fit "
         "near 20 kHz.\n",
         "## Ours and other programs, playing\n",
         _table(["curve", "by", *rates], peers),
