@@ -48,6 +48,7 @@ def test_other_programs_err_as_is_known(program: str, through: equalisation.Filt
 
 def test_a_program_that_is_not_there_is_said_to_be_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shutil, "which", lambda _: None)
+    monkeypatch.setattr(equalisation, "RATES_HZ", (44_100,))
     rows = list(equalisation.peer_rows())
     assert {cell for row in rows for cell in row[2:] if row[1] != "ours"} == {"not installed"}
     assert equalisation.version_of("sox") == "sox not installed"
