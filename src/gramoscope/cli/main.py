@@ -13,6 +13,7 @@ from importlib.metadata import version
 
 import cyclopts
 
+from gramoscope.cli.characteristics import characteristics
 from gramoscope.cli.compare import compare
 from gramoscope.cli.demo import demo
 from gramoscope.cli.film import film
@@ -46,7 +47,7 @@ app = cyclopts.App(
     result_action="return_value",
     default_parameter=cyclopts.Parameter(negative=()),
 )
-for command in (demo, film, play, compare, info, recipe, pack):
+for command in (demo, film, play, compare, info, recipe, characteristics, pack):
     app.command(command)
 
 

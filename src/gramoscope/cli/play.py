@@ -59,8 +59,10 @@ def play(
     rate
         Samples a second.
     characteristic
-        Recording characteristic to undo in `equalised.wav`: riaa, flat, aes, nab, columbia-lp, european-78, … As the capture
-        says when left out, riaa (as in the paper) if it does not.
+        Recording characteristic to undo in `equalised.wav`: a name (riaa, flat, aes, decca-ffrr, …) or turnover in Hz, shelf
+        and roll-off in dB at 10 kHz, as collectors write them: 500N-16, 300R-12.7, 250N-0. `gramoscope characteristics` lists
+        names and letters, and looks up a label and a year. As the capture says when left out, riaa (as in the paper) if it
+        does not.
     declick
         Replace clicks by what their surroundings predict, with the pickup's flags as witnesses.
     decrackle

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from gramoscope.apparatus.capture import Capture
+from gramoscope.disc.characteristics import characteristic
 from gramoscope.disc.formats import direction_of_cut
 from gramoscope.pickup.cartridge import Pickup
 from gramoscope.player.centring import Centring
@@ -38,7 +39,8 @@ def transfer_report(
     """Return the report of a transfer as plain numbers, texts, lists and dicts."""
     seconds, files = monitor.samples / settings.rate_hz, outputs.complete()
     repair = None if outputs.cues is None else outputs.cues.as_dict(recipe.repair)
-    equalised = {"characteristic": settings.characteristic_name, "made_of": (FLAT if repair is None else REPAIRED).name}
+    curve = characteristic(settings.characteristic_name).name
+    equalised = {"characteristic": curve, "made_of": (FLAT if repair is None else REPAIRED).name}
     gauge = monitor.gauge or HoleGauge(capture.bench.rotation)
     hole = gauge.finding()
     return {
