@@ -67,3 +67,6 @@ class Processor:
     ) -> tuple[FloatArray, Float32Array]:
         """See `texture.hearing.heard`."""
         return heard(ear, columns, rows, clear, power_limits=power_limits)
+
+
+PROCESSOR = Processor()

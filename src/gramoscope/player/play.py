@@ -22,6 +22,8 @@ from gramoscope.errors import CaptureError, require
 from gramoscope.listening.broadcast_wave import FULL_SCALE_M_S
 from gramoscope.listening.flac import HIGHEST_RATE_HZ as HIGHEST_FLAC_RATE_HZ
 from gramoscope.pickup.cartridge import Pickup
+from gramoscope.pickup.device import Device
+from gramoscope.pickup.processor import PROCESSOR
 from gramoscope.player.catalogue import Catalogue, metadata_of
 from gramoscope.player.monitor import OVERVIEW_POINTS, Monitor
 from gramoscope.player.outputs import Outputs
@@ -63,6 +65,8 @@ class Settings:
         Write every sound as FLAC too.
     catalogue : Catalogue
         The archive's words.
+    device : Device
+        On which groups are read; results agree to rounding.
     """
 
     rate_hz: float = 96_000.0
@@ -71,6 +75,7 @@ class Settings:
     full_scale_m_s: float = FULL_SCALE_M_S
     flac: bool = False
     catalogue: Catalogue = field(default_factory=Catalogue)
+    device: Device = PROCESSOR
 
     def __post_init__(self) -> None:
         possible = 1000 <= self.rate_hz <= 1_000_000 and self.rate_hz == round(self.rate_hz)
@@ -126,7 +131,7 @@ def play(
     hashes, monitor = InputHashes(), _monitor(capture, settings.rate_hz)
 
     with _outputs(capture, recipe, folder, settings) as files:
-        pickup = learned(capture, recipe, settings.workers, progress=progress)
+        pickup = learned(capture, recipe, settings.workers, device=settings.device, progress=progress)
         traces = _picked_up(capture, pickup, settings.workers, hashes, monitor, progress)
         motion = tonearm.follow(_spliced(traces, recipe, monitor))
         sound = files.kept(WALLS, resampler.resample(motion), WallSplitter(direction, pickup.walls).split)
@@ -143,7 +148,9 @@ def play(
     return report
 
 
-def learned(capture: Capture, recipe: Recipe, workers: int, *, progress: Progress | None = None) -> Pickup:
+def learned(
+    capture: Capture, recipe: Recipe, workers: int, *, device: Device = PROCESSOR, progress: Progress | None = None
+) -> Pickup:
     """Return the recipe's cartridge, fitted to a capture, as it is after learning the passage.
 
     Parameters
@@ -151,11 +158,13 @@ def learned(capture: Capture, recipe: Recipe, workers: int, *, progress: Progres
     capture : Capture
     recipe : Recipe
     workers : int
+    device : Device
+        On which it will read.
     progress : callable, optional
         Told how much is done, of how much, and of what.
     """
     with spreading(workers) as spread:
-        cartridge = recipe.cartridge_for(capture.bench)
+        cartridge = recipe.cartridge_for(capture.bench, device)
 
         def told(done: int, total: int) -> None:
             if progress is not None:

@@ -34,8 +34,9 @@ def _normal_equation(here, there, rows, shift_px, thread):  # type: ignore[no-un
     width = here.shape[1]
     start, stop, offset, fraction = placement(shift_px, width, width)
     start, stop = max(start + 1, 2), min(stop - 1, width - 2)
-    a, b, c, d, e, f = quintic_taps(fraction)
-    a, b, c, d, e, f = float32(a), float32(b), float32(c), float32(d), float32(e), float32(f)
+    taps = quintic_taps(fraction)
+    a, b, c = float32(taps[0]), float32(taps[1]), float32(taps[2])
+    d, e, f = float32(taps[3]), float32(taps[4]), float32(taps[5])
     square, cross = float32(0), float32(0)
     for i in range(rows.size):
         one, other = here[rows[i]], there[rows[i]]
