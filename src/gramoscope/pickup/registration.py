@@ -104,7 +104,7 @@ def _add_row(before, here, after, beyond, taps, weight, total, moment):  # type:
 @numba.njit(cache=True, nogil=True)
 def placement(shift_px: float, width: int, canvas_width: int) -> tuple[int, int, int, float]:
     """Canvas columns [start, stop) that a frame covers, its column minus theirs, and the fraction between."""
-    offset = math.floor(-shift_px)  # one that CUDA has too
+    offset = int(math.floor(-shift_px))  # noqa: RUF046  CUDA has this floor only, and its is a float
     fraction = -shift_px - offset
     start = max(0, 1 - offset)
     stop = min(canvas_width, width - 2 - offset)

@@ -38,8 +38,7 @@ def test_a_card_that_is_not_there_is_told_with_a_remedy() -> None:
         *("-c", "from gramoscope.player.devices import device_named; device_named('cuda')"),
         # neither the simulator nor a real card
         NUMBA_ENABLE_CUDASIM="0",
-        CUDA_VISIBLE_DEVICES="",
-        NUMBA_CUDA_DRIVER="/nowhere",
+        CUDA_VISIBLE_DEVICES="-1",
     )
     assert told.returncode != 0
     assert "no graphics card that CUDA can use" in told.stderr
