@@ -16,12 +16,12 @@ from gramoscope.pickup.device import Film
 from gramoscope.pickup.overlay import TILE_COLUMNS, TILE_ROWS, overlay_width
 from gramoscope.pickup.processor import PROCESSOR
 from gramoscope.pickup.texture.filter_bank import FilterBank
-from gramoscope.pickup.texture.following import REACH, places_of, wide_rows
+from gramoscope.pickup.texture.following import REACH, channels, places_of, wide_rows
 from gramoscope.pickup.texture.hearing import Ear
 from gramoscope.pickup.texture.layout import StripeLayout
-from gramoscope.pickup.texture.likelihood import StripeStatistics
+from gramoscope.pickup.texture.likelihood import TEXTURE_PX, StripeStatistics
 from gramoscope.pickup.texture.reading import Model, Rules, read
-from gramoscope.pickup.texture.spectrum import Band
+from gramoscope.pickup.texture.spectrum import Band, filtered
 from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.pickup.texture.tone import Tone
 from gramoscope.pickup.texture_likelihood import samples_of
@@ -188,10 +188,17 @@ def test_columns_without_the_usual_texture_are_left_out() -> None:
     picture[:20] = 100 + 9 * (picture[:20] - 100)
     rows = np.full((2, COLUMNS), 25.2)
     assert _weight(ear, picture, rows, clear, (0.0, np.inf)).min() > 0.99999, "all are believed without limits"
-    for limits in ((0.0, 1.0), (0.0, 100.0), (5.0, 1e9)):
+    white = filtered(channels(picture, rows[0], HALF_PX, ear.basis[0, : wide_rows(HALF_PX)]), _whitener(ear))
+    power = ndimage.uniform_filter1d(np.sum((white @ ear.usual[0]) ** 2, axis=1), TEXTURE_PX, mode="nearest")
+    for limits in ((0.0, 0.99 * power.max()), (1.01 * power.min(), np.inf)):
         weight = _weight(ear, picture, rows, clear, limits)
         _, weight_ = PROCESSOR.heard(ear, picture, rows, clear, power_limits=limits)
+        assert 0 < weight_[0].mean() < 0.99, "some are left out"
         np.testing.assert_allclose(weight, weight_, atol=1e-6)
+
+
+def _whitener(ear: Ear) -> FloatArray:
+    return np.concatenate([ear.half_taps[:0:-1], ear.half_taps]).astype(np.float64)
 
 
 def _model(layout: StripeLayout, tone: Tone) -> Model:
@@ -200,8 +207,7 @@ def _model(layout: StripeLayout, tone: Tone) -> Model:
         FilterBank(ear.basis[i, : wide_rows(HALF_PX)], ear.filters[i], ear.sign[i], 0.1 * ear.usual[i]) for i in (0, 1)
     ]
     stripes = tuple(StripeStatistics(bank, 4.0, 9.0, 0.0, np.ones(9), 1e4) for bank in banks)
-    whitener = np.concatenate([ear.half_taps[:0:-1], ear.half_taps]).astype(np.float64)
-    return Model(layout, tone, whitener, HALF_PX, ear.band, LENGTH, stripes)
+    return Model(layout, tone, _whitener(ear), HALF_PX, ear.band, LENGTH, stripes)
 
 
 def test_a_stretch_is_read_alike_within_a_thousandth_of_its_error() -> None:
