@@ -106,13 +106,6 @@ class Characteristic:
             )
 
     @property
-    def rolloff_db(self) -> float:
-        """By how many decibels playback falls at 10 kHz through the treble corner, 10 lg(1 + (10 kHz/f₃)²); 0 for none."""
-        if self.rolloff_hz is None:
-            return 0.0
-        return float(10 * np.log10(1 + (ROLLOFF_STATED_AT_HZ / self.rolloff_hz) ** 2))
-
-    @property
     def is_flat(self) -> bool:
         """Whether the record was cut without any tilt."""
         return self.turnover_hz is None and self.rolloff_hz is None

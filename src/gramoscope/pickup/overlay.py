@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gramoscope.conventions import BoolArray, Float32Array, FloatArray
+from gramoscope.pickup.device import Kept
 from gramoscope.pickup.registration import cubic_taps, placement
 from gramoscope.signal_path import ImageArray
 
@@ -31,7 +32,8 @@ class Overlay:
     Attributes
     ----------
     columns : float32 array, shape (column, row)
-        Grey levels, in the coordinates of the first frame, extended forward by the last shift; 0 where not wanted.
+        Grey levels, in the coordinates of the first frame, extended forward by the last shift; 0 where not wanted. Lies
+        where the device that drew it keeps it (`pickup.device`).
     frames : int64 array, shape (column,)
         How many frames each column rests on.
     shift_px : float64 array, shape (frame,)
@@ -40,7 +42,7 @@ class Overlay:
         Which frames of the group were used.
     """
 
-    columns: Float32Array
+    columns: Kept
     frames: npt.NDArray[np.int64]
     shift_px: FloatArray
     frame_index: npt.NDArray[np.int64]
@@ -169,10 +171,7 @@ def overlay(
     """
     height, width = images.shape[1:]
     canvas_width = overlay_width(width, shift_px)
-    counts = np.zeros(canvas_width, np.int64)
-    for shift in shift_px:
-        start, stop, _, _ = placement(float(shift), width, canvas_width)
-        counts[start:stop] += 1
+    counts = frames_in(width, shift_px)
     columns = np.zeros((canvas_width, height), np.float32)
     tiles = all_tiles((height, canvas_width)) if wanted is None else wanted
     share = (1 / np.maximum(counts, 1)).astype(np.float32)
@@ -185,9 +184,41 @@ def overlay(
     return Overlay(columns, counts, shift_px, frame_index)
 
 
+def frames_in(width: int, shift_px: FloatArray) -> npt.NDArray[np.int64]:
+    """Return how many frames of such a width each column of their overlay rests on."""
+    counts = np.zeros(overlay_width(width, shift_px), np.int64)
+    for shift in shift_px:
+        start, stop, _, _ = placement(float(shift), width, counts.size)
+        counts[start:stop] += 1
+    return counts
+
+
 def overlay_width(width: int, shift_px: FloatArray) -> int:
     """Return how many columns an overlay has, of frames that have so many."""
     return width + int(np.floor(shift_px.max(initial=0.0)))
+
+
+@numba.njit(cache=True, nogil=True)
+def _brighter(column, level):  # type: ignore[no-untyped-def]
+    count = 0
+    for row in range(column.size):
+        count += column[row] >= level
+    return count
+
+
+@numba.njit(cache=True, nogil=True)
+def places_brighter(columns, level):  # type: ignore[no-untyped-def]
+    """Return column and row of all points of a picture, [column, row], that reach a level, shape (place, 2)."""
+    counts = np.empty(len(columns), np.int64)
+    for x in range(len(columns)):
+        counts[x] = _brighter(columns[x], level)
+    places, n = np.empty((counts.sum(), 2), np.int64), 0
+    for seen in np.flatnonzero(counts):
+        for row in range(columns.shape[1]):
+            if columns[seen, row] >= level:
+                places[n, 0], places[n, 1] = seen, row
+                n += 1
+    return places
 
 
 GAUSSIAN_REACH = 4

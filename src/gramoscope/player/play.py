@@ -23,6 +23,8 @@ from gramoscope.errors import CaptureError, require
 from gramoscope.listening.broadcast_wave import FULL_SCALE_M_S
 from gramoscope.listening.flac import HIGHEST_RATE_HZ as HIGHEST_FLAC_RATE_HZ
 from gramoscope.pickup.cartridge import Pickup
+from gramoscope.pickup.device import Device
+from gramoscope.pickup.processor import PROCESSOR
 from gramoscope.player.catalogue import Catalogue, metadata_of
 from gramoscope.player.centring import surveyed
 from gramoscope.player.hints import Hints
@@ -82,6 +84,8 @@ class Settings:
         The archive's words.
     speed : Speed
         How fast the record shall turn.
+    device : Device
+        On which groups are read; results agree to rounding.
     """
 
     rate_hz: float = 96_000.0
@@ -91,6 +95,7 @@ class Settings:
     flac: bool = False
     catalogue: Catalogue = field(default_factory=Catalogue)
     speed: Speed = field(default_factory=Speed)
+    device: Device = PROCESSOR
 
     def __post_init__(self) -> None:
         possible = 1000 <= self.rate_hz <= 1_000_000 and self.rate_hz == round(self.rate_hz)
@@ -147,7 +152,7 @@ def play(
     hashes, monitor = InputHashes(), _monitor(capture, settings)
 
     with _outputs(capture, recipe, folder, settings) as files:
-        pickup = learned(capture, recipe, settings.workers, progress=progress)
+        pickup = learned(capture, recipe, settings.workers, device=settings.device, progress=progress)
         centring = surveyed(capture, pickup, settings.workers, asked=settings.speed.remove_wow)
         traces = _picked_up(capture, pickup, settings.workers, hashes, monitor, progress)
         motion = tonearm.follow(_spliced(centring.centred(traces), recipe, monitor))
@@ -164,7 +169,9 @@ def play(
     return report
 
 
-def learned(capture: Capture, recipe: Recipe, workers: int, *, progress: Progress | None = None) -> Pickup:
+def learned(
+    capture: Capture, recipe: Recipe, workers: int, *, device: Device = PROCESSOR, progress: Progress | None = None
+) -> Pickup:
     """Return the recipe's cartridge, fitted to a capture, as it is after learning the passage.
 
     Parameters
@@ -172,11 +179,13 @@ def learned(capture: Capture, recipe: Recipe, workers: int, *, progress: Progres
     capture : Capture
     recipe : Recipe
     workers : int
+    device : Device
+        On which it will read.
     progress : callable, optional
         Told how much is done, of how much, and of what.
     """
     with spreading(workers) as spread:
-        cartridge = recipe.cartridge_for(capture.bench)
+        cartridge = recipe.cartridge_for(capture.bench, device)
 
         def told(done: int, total: int) -> None:
             if progress is not None:

@@ -19,9 +19,11 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from gramoscope.apparatus.bench import Bench
 from gramoscope.errors import ArgumentError, require
 from gramoscope.pickup.cartridge import Cartridge
+from gramoscope.pickup.device import Device
 from gramoscope.pickup.flow.flow_method import FlowMethod
 from gramoscope.pickup.flow.horn_schunck import GrooveHornSchunck, HornSchunck
 from gramoscope.pickup.flow.multigrid_horn_schunck import MultigridHornSchunck
+from gramoscope.pickup.processor import PROCESSOR
 from gramoscope.pickup.seed_paper import SeedPaperPickup
 from gramoscope.pickup.texture_likelihood import TextureLikelihood
 from gramoscope.preamp.declick import Declicker
@@ -77,9 +79,18 @@ class Recipe:
     passband: float = DEFAULT_PASSBAND
     repair: Repair = field(default_factory=Repair)
 
-    def cartridge_for(self, bench: Bench) -> Cartridge:
-        """Return the cartridge, fitted to an apparatus."""
-        return _CARTRIDGES[self.cartridge](bench, **self.pickup)
+    def cartridge_for(self, bench: Bench, device: Device = PROCESSOR) -> Cartridge:
+        """Return the cartridge, fitted to an apparatus, reading on a device; ArgumentError if it has no kernels for it."""
+        kind = _CARTRIDGES[self.cartridge]
+        if issubclass(kind, TextureLikelihood):
+            return kind(bench, **self.pickup, device=device)
+        require(
+            device == PROCESSOR,
+            f"the recipe {self.name!r} on {device.name}",
+            "a recipe of the cartridge texture-likelihood, which has kernels for it",
+            "--recipe best, or leave --device out",
+        )
+        return kind(bench, **self.pickup)
 
 
 def shipped_recipes() -> tuple[str, ...]:
@@ -191,7 +202,7 @@ def with_repairs(recipe: Recipe, *, declick: bool, decrackle: bool, rumble_hz: f
 
 
 def _parameters(kind: type[Any]) -> tuple[str, ...]:
-    return tuple(f.name for f in fields(kind) if f.name != "bench")
+    return tuple(f.name for f in fields(kind) if f.name not in ("bench", "device"))
 
 
 def _cartridge_of_table(table: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:

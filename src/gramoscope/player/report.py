@@ -68,6 +68,7 @@ def transfer_report(
         "flags": {str(flag.name).lower(): describe(flag) for flag in Quality},
         "capture_problems": list(capture.problems),
         "recipe": recipe_of(recipe),
+        "device": settings.device.name,
         "bench": bench_of(capture),
         "inputs": hashes.as_dict(capture),
         "versions": versions(),

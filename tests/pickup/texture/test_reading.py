@@ -10,6 +10,7 @@ import pytest
 
 from gramoscope.conventions import INNER, OUTER, FloatArray
 from gramoscope.disc.formats import Cut
+from gramoscope.pickup.overlay import places_brighter
 from gramoscope.pickup.texture import reading
 from gramoscope.pickup.texture.filter_bank import FilterBank
 from gramoscope.pickup.texture.hearing import clear_columns
@@ -27,7 +28,7 @@ from gramoscope.pickup.texture.reading import (
     step,
 )
 from gramoscope.pickup.texture.spectrum import Band
-from gramoscope.pickup.texture.stretch import Stretch, places_brighter
+from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.pickup.texture.tone import Tone
 
 WIDTH = 800

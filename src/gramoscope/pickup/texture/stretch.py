@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
-import numba
-import numpy as np
-
-from gramoscope.conventions import BoolArray, Float32Array, FloatArray, IntArray
+from gramoscope.conventions import BoolArray, FloatArray, IntArray
+from gramoscope.pickup.device import Device, Kept
+from gramoscope.pickup.processor import Processor
 from gramoscope.pickup.texture.tone import Tone
 
 AS_IT_IS = Tone()
@@ -20,7 +19,7 @@ class Stretch:
     Attributes
     ----------
     columns : float32 array, shape (column, row)
-        The registered picture, transposed.
+        The registered picture, transposed; where the device keeps it.
     usable : bool array, shape (column,)
         Columns that rest on enough frames.
     burnt : int64 array, shape (place, 2)
@@ -31,45 +30,25 @@ class Stretch:
         How sharp the coarse search found each stripe.
     tone : Tone
         In which the picture is seen: before it is interpolated, for bright grains ring less then.
+    device : Device
+        Where the picture lies and is heard.
     """
 
-    columns: Float32Array
+    columns: Kept
     usable: BoolArray
     burnt: IntArray
     displacement_px: FloatArray
     support: FloatArray
     tone: Tone = AS_IT_IS
+    device: Device = field(default_factory=Processor)
 
     def in_tone(self, tone: Tone) -> Stretch:
         """Return the same stretch seen in a tone; only a picture that is as it was can be seen in another one."""
         if tone == self.tone or tone.compression == self.tone.compression == 0:
             return self
         assert self.tone.compression == 0
-        return replace(self, columns=tone(self.columns), tone=tone)
+        return replace(self, columns=self.device.in_tone(self.columns, tone), tone=tone)
 
     def moved(self, step_px: FloatArray) -> Stretch:
         """Return the same stretch with its paths moved, shape (2, column)."""
         return replace(self, displacement_px=self.displacement_px + step_px)
-
-
-@numba.njit(cache=True, nogil=True)
-def _brighter(column, level):  # type: ignore[no-untyped-def]
-    count = 0
-    for row in range(column.size):
-        count += column[row] >= level
-    return count
-
-
-@numba.njit(cache=True, nogil=True)
-def places_brighter(columns, level):  # type: ignore[no-untyped-def]
-    """Return column and row of all points of a picture, [column, row], that reach a level, shape (place, 2)."""
-    counts = np.empty(len(columns), np.int64)
-    for x in range(len(columns)):
-        counts[x] = _brighter(columns[x], level)
-    places, n = np.empty((counts.sum(), 2), np.int64), 0
-    for seen in np.flatnonzero(counts):
-        for row in range(columns.shape[1]):
-            if columns[seen, row] >= level:
-                places[n, 0], places[n, 1] = seen, row
-                n += 1
-    return places
