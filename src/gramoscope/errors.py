@@ -6,6 +6,7 @@
     │   ├── ManifestError                     capture.toml: a key is missing, unknown or out of its range
     │   └── NoFramesError                     the manifest is fine, and not one frame can be read
     ├── SoundError                            a sound file cannot be read, or is of no use
+    ├── TransferError                         a folder is no whole transfer: no report, a file missing, a sum that differs
     └── OutputError                           the results cannot be written: a full disk, a folder without permission
 
 An exception is for the caller's failure. Where the *world* fails locally (dust, a chipped wall, a lost frame) nothing is
@@ -64,6 +65,10 @@ class NoFramesError(CaptureError):
 
 class SoundError(GramoscopeError):
     """A sound file cannot be read, or is of no use."""
+
+
+class TransferError(GramoscopeError):
+    """A folder is no whole transfer."""
 
 
 class OutputError(GramoscopeError):

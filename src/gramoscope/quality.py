@@ -1,7 +1,8 @@
 """One bit for each way in which a sample can be bad.
 
 Flags travel with the samples from the pickup to the report. A sample without flags is a measurement; `INTERPOLATED` means
-that nobody saw the groove there and the value comes from its surroundings. Several bits can stand together, as cause and
+that nobody saw the groove there and the value comes from its surroundings, `DECLICKED` that somebody chose to do without what
+was seen. Several bits can stand together, as cause and
 consequence: ``NO_STRIPE | INTERPOLATED``.
 """
 
@@ -27,6 +28,8 @@ class Quality(IntFlag):
     OUTLIER = 64
     NO_OVERLAP = 128
     EDGE = 256
+    DECLICKED = 512
+    DECRACKLED = 1024
 
 
 _MEANINGS: dict[Quality, str] = {
@@ -39,9 +42,11 @@ _MEANINGS: dict[Quality, str] = {
     Quality.OUTLIER: "the measurement disagreed with its surroundings and was given no weight",
     Quality.NO_OVERLAP: "this stretch could not be matched to its neighbour: its place is the encoder's",
     Quality.EDGE: "at the very start or end of the passage, where only one side supports the value",
+    Quality.DECLICKED: "repaired: a click stood here, and the value is what its surroundings predict",
+    Quality.DECRACKLED: "repaired: crackle was taken off the measurement here",
 }
 
-NOT_MEASURED = Quality.INTERPOLATED
+NOT_MEASURED = Quality.INTERPOLATED | Quality.DECLICKED
 
 
 def describe(flag: Quality) -> str:

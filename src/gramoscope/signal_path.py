@@ -229,3 +229,42 @@ class GrooveSound:
 
     lateral: Audio
     vertical: Audio
+
+
+@dataclass(frozen=True)
+class Cue:
+    """A span of sound that a repair has touched, or that nobody measured.
+
+    Attributes
+    ----------
+    kind : {"declick", "decrackle", "rumble", "interpolated"}
+        By what; "interpolated" was bridged while reading, and not touched since.
+    start_sample, stop_sample : int
+        The first sample, and the first after the last; sample 0 is s = 0.
+    rate_hz : float
+    peak_change_m_s, rms_change_m_s : float
+        Largest and root-mean-square size of what was taken off.
+    change_db : float
+        Rms of what was taken off against that of what stood there; NaN in silence.
+    reason : str
+        Why: flags by name, and how many standard errors the largest change is.
+    """
+
+    kind: str
+    start_sample: int
+    stop_sample: int
+    rate_hz: float
+    peak_change_m_s: float
+    rms_change_m_s: float
+    change_db: float
+    reason: str
+
+    @property
+    def start_s(self) -> float:
+        """Time of the first sample."""
+        return self.start_sample / self.rate_hz
+
+    @property
+    def stop_s(self) -> float:
+        """Time of the first sample after the last."""
+        return self.stop_sample / self.rate_hz

@@ -15,10 +15,11 @@ def test_a_row_tells_time_share_and_how_far_from_real_time_it_is() -> None:
     sounding_s = bench.sequence.group_step_m / float(bench.rotation.speed_at_m_s(0.0))
     capture: Any = SimpleNamespace(bench=bench)
     rows = [("laying", 4e-3, 8e6), ("search", 2 * sounding_s, 0.0)]
-    lines = page(rows, capture, 8_000_000, Ceilings(20e9, 50e9)).splitlines()
+    lines = page(rows, capture, 8_000_000, Ceilings(20e9, 50e9), "cpu").splitlines()
     assert "| laying | 4.00 | 0.50 | 10.0 % |" in lines[-2]
     assert lines[-1].endswith("| – | 0.500 |")
     assert "20.0 GB/s" in "".join(lines)
+    assert "read on cpu" in "".join(lines)
 
 
 def test_ceilings_are_those_of_a_machine() -> None:

@@ -105,6 +105,7 @@ PLAY_REFUSED = [
     (("--out", "o", "--description", "d" * 257), "the description has 257 characters"),
     (("--out", "o", "--workers", "0"), "at least 1"),
     (("--out", "o", "--characteristic", "riia"), "did you mean riaa"),
+    (("--out", "o", "--characteristic", "500-16"), "500N-16"),
     (("--out", "file"), "the folder file cannot be made"),
     (("--out", "file/deeper"), "the folder file/deeper cannot be made"),
     (("--out", "/proc/gramoscope"), "the folder /proc/gramoscope cannot be made"),

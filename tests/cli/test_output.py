@@ -15,7 +15,7 @@ import soundfile
 import wavinfo
 
 COMMAND = [sys.executable, "-c", "import sys; from gramoscope.cli.main import main; sys.exit(main())"]
-COMMANDS = ("demo", "film", "play", "compare", "info", "recipe")
+COMMANDS = ("demo", "film", "play", "compare", "info", "recipe", "characteristics", "pack")
 
 
 @pytest.fixture(scope="session")

@@ -21,7 +21,7 @@ WIDTH = 203
 
 def _stretch(displacement_px: np.ndarray) -> Stretch:
     nothing = np.zeros((WIDTH, 5), np.float32)
-    return Stretch(nothing, np.ones(WIDTH, bool), nothing > 0, displacement_px, np.ones((4, WIDTH)))
+    return Stretch(nothing, np.ones(WIDTH, bool), np.empty((0, 2), np.int64), displacement_px, np.ones((4, WIDTH)))
 
 
 def _evidence(rng: np.random.Generator, information: np.ndarray) -> Evidence:

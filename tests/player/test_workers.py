@@ -33,8 +33,8 @@ def test_no_tasks_no_answers() -> None:
     assert list(in_order(lambda number: number, [], workers=2)) == []
 
 
-@pytest.mark.parametrize("workers", [1, 3])
-def test_no_more_tasks_are_taken_than_workers_and_one(workers: int) -> None:
+@pytest.mark.parametrize(("workers", "ahead"), [(1, 0), (3, 0), (2, 7)])
+def test_no_more_tasks_are_taken_than_may_wait(workers: int, ahead: int) -> None:
     taken = 0
 
     def tasks() -> Iterator[int]:
@@ -43,8 +43,20 @@ def test_no_more_tasks_are_taken_than_workers_and_one(workers: int) -> None:
             taken += 1
             yield number
 
-    for received, _ in enumerate(in_order(lambda number: number, tasks(), workers=workers), start=1):
-        assert taken - received <= workers, "a stretch more would be in memory"
+    for received, _ in enumerate(in_order(lambda number: number, tasks(), workers=workers, ahead=ahead), start=1):
+        assert taken - received <= max(workers, ahead), "a stretch more would be in memory"
+
+
+def test_work_goes_on_while_an_answer_is_looked_at() -> None:
+    done = []
+    answers = in_order(done.append, range(30), workers=2, ahead=10)
+    next(answers)
+    for _ in range(200):
+        if len(done) >= 10:
+            break
+        time.sleep(0.005)
+    assert 10 <= len(done) <= 11
+    assert sum(1 for _ in answers) == 29
 
 
 def test_several_tasks_are_at_work_at_a_time_but_no_more_than_workers() -> None:
@@ -73,7 +85,7 @@ def test_the_first_exception_is_raised_and_nothing_more_begins() -> None:
             raise ValueError(f"task {number}")
         return number
 
-    answers = in_order(work, range(1000), workers=2)
+    answers = in_order(work, range(1000), workers=2, ahead=0)
     assert [next(answers) for _ in range(4)] == [0, 1, 2, 3]
     with pytest.raises(ValueError, match="task 4"):
         next(answers)
@@ -94,7 +106,7 @@ def test_a_consumer_that_stops_shuts_the_pool_down(kind: type[BaseException]) ->
         return number
 
     def consume() -> None:
-        for number in in_order(work, range(1000), workers=2):
+        for number in in_order(work, range(1000), workers=2, ahead=0):
             if number == 3:
                 raise kind
 

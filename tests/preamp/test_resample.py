@@ -12,6 +12,7 @@ from gramoscope.preamp.resample import Resampler
 from gramoscope.quality import Quality
 from gramoscope.signal_path import GrooveMotion
 from gramoscope.turntable.rotation import Rotation
+from gramoscope.turntable.speed_curve import DriftingRotation, SpeedCurve
 
 SPIRAL = Rotation(rpm=78.26, radius_m=0.0731, pitch_m=254e-6)
 STEP_M = 3.9e-6
@@ -221,3 +222,26 @@ def test_sound_comes_out_while_the_groove_still_comes_in():
 def test_the_history_tells_grid_rate_and_speed():
     (line,) = joined(Resampler(SPIRAL).resample([motion_of(noise)])).history
     assert line == "lateral motion resampled from every 3.9 µm to 96000 Hz at 78.26 rpm"
+
+
+LINEAR_DRIFT = DriftingRotation.following(SpeedCurve((0.0, 0.02, 0.1), (78.0, 78.26, 86.0)), SPIRAL)
+
+
+@pytest.mark.parametrize("rate_hz", [96_000.0, 44_100.0])
+def test_a_tone_cut_by_a_lathe_that_ran_faster_and_faster_comes_out_straight(rate_hz):
+    """With 78 rpm throughout it would score +3 dB: nothing of it fits."""
+    motion = motion_of(lambda t: tone(t, 10_000.0), rotation=LINEAR_DRIFT)
+    sound = joined(Resampler(LINEAR_DRIFT, rate_hz=rate_hz).resample([motion]))
+    assert error_db(sound, lambda t: tone(t, 10_000.0)) < -110
+    assert sound.samples.size == int(np.floor(LINEAR_DRIFT.time_of_arc_s(-7.3e-6 + 21_282 * STEP_M) * rate_hz))
+    assert "78 to 86 rpm by a curve of 3 points" in sound.history[0]
+    straight = joined(Resampler(replace(SPIRAL, rpm=78.0), rate_hz=rate_hz).resample([motion]))
+    assert error_db(straight, lambda t: tone(t, 10_000.0)) > -3
+
+
+def test_under_a_speed_curve_too_cutting_into_pieces_changes_no_bit():
+    motion = motion_of(noise, rotation=LINEAR_DRIFT)
+    whole = joined(Resampler(LINEAR_DRIFT).resample([motion]))
+    parts = joined(Resampler(LINEAR_DRIFT).resample(cut(motion, *range(1, 21_000, 1777))))
+    for name in ("samples", "sigma", "flags"):
+        np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))

@@ -85,8 +85,8 @@ def test_smoothing_is_gaussian_process_regression() -> None:
     across = lateral[:, readings.bin]
     mean = across @ np.linalg.solve(dense, readings.value)
     sigma = np.sqrt(np.diag(lateral - across @ np.linalg.solve(dense, across.T)))
-    filtered = forward(moves, readings, _begin())
-    found = backward(moves, readings, filtered, wanted=PLACES)
+    filtered = forward(moves, readings, _begin(), wanted=PLACES)
+    found = backward(moves, readings, filtered)
     np.testing.assert_allclose(found.mean[:, 0], mean, atol=2e-3 * sigma.min())
     np.testing.assert_allclose(found.sigma[:, 0], sigma, rtol=2e-3)
     chi2 = readings.value @ np.linalg.solve(dense, readings.value)
@@ -99,7 +99,7 @@ def test_the_kernels_agree_with_the_textbook(wanted: np.ndarray) -> None:
     moves, readings = _moves(scale=9.0), _readings()
     moves = replace(moves, agitation=np.where(np.arange(BINS) % 20 < 5, 30.0, 1.0))
     mean, sigma = smooth_reference(moves, readings, _begin(), wanted=wanted)
-    found = backward(moves, readings, forward(moves, readings, _begin()), wanted=wanted)
+    found = backward(moves, readings, forward(moves, readings, _begin(), wanted=wanted))
     np.testing.assert_allclose(found.mean, mean, atol=1e-6 * sigma.min())
     np.testing.assert_allclose(found.sigma, sigma, rtol=1e-6)
 
@@ -110,13 +110,13 @@ def test_the_distance_of_a_reading_is_that_from_all_others(number: int, left_out
     moves, readings = _moves(), _readings()
     others = np.arange(readings.value.size) != number
     allowed = others if left_out else np.ones_like(others)
-    found = backward(moves, readings, forward(moves, readings, _begin(), allowed=allowed), wanted=PLACES).distance
+    found = backward(moves, readings, forward(moves, readings, _begin(), allowed=allowed)).distance
     rest = Readings(*(getattr(readings, name)[others] for name in readings.__dataclass_fields__))
     # what the others say of h·x: ask for it as a reading that knows nothing
     weak = np.where(others, readings.variance, 1e-6)
     asking = replace(readings, variance=weak, gate_variance=weak)
-    smoothed = backward(moves, asking, forward(moves, asking, _begin()), wanted=ROWS)
-    plain = backward(moves, rest, forward(moves, rest, _begin()), wanted=PLACES)
+    smoothed = backward(moves, asking, forward(moves, asking, _begin(), wanted=ROWS))
+    plain = backward(moves, rest, forward(moves, rest, _begin(), wanted=PLACES))
     k = readings.bin[number]
     np.testing.assert_allclose(smoothed.mean[:, [0, STATES]], plain.mean, atol=1e-12)
     assert np.all(smoothed.sigma[:, [0, STATES]] <= plain.sigma * (1 + 1e-6))
@@ -140,20 +140,32 @@ def _sigma_of(moves: Moves, readings: Readings, h: np.ndarray, k: int) -> float:
         np.append(readings.gate_variance, variance)[order],
     )
     filtered = forward(moves, more, _begin(), allowed=order != order.size - 1)
-    far = backward(moves, more, filtered, wanted=PLACES).distance[np.argmax(order == order.size - 1)]
-    plain = backward(moves, readings, forward(moves, readings, _begin()), wanted=ROWS)
+    far = backward(moves, more, filtered).distance[np.argmax(order == order.size - 1)]
+    plain = backward(moves, readings, forward(moves, readings, _begin(), wanted=ROWS))
     return float(np.sqrt((h @ plain.mean[k] / far) ** 2 - variance))
 
 
 def test_a_filter_goes_on_where_it_stopped() -> None:
     moves, readings = _moves(scale=4.0), _readings()
-    whole = forward(moves, readings, _begin())
+    whole = forward(moves, readings, _begin(), wanted=ROWS, resume=37)
     later = readings.bin >= 37
     rest = Readings(*(getattr(readings, name)[later] for name in readings.__dataclass_fields__))
     rest = replace(rest, bin=rest.bin - 37)
-    again = forward(replace(moves, model=moves.model[37:], agitation=moves.agitation[37:]), rest, whole.state(37))
+    later_moves = replace(moves, model=moves.model[37:], agitation=moves.agitation[37:])
+    again = forward(later_moves, rest, whole.resume, wanted=ROWS)
     np.testing.assert_array_equal(again.mean, whole.mean[37:])
-    np.testing.assert_array_equal(again.covariance, whole.covariance[37:])
+    np.testing.assert_array_equal(again.toward, whole.toward[37:])
+
+
+def test_what_a_bin_expects_of_a_reading_does_not_depend_on_the_others_in_it() -> None:
+    moves, readings = _moves(), _readings()
+    found = forward(moves, readings, _begin(), gate=Gate(1.0), wanted=ROWS)
+    assert 10 < np.count_nonzero(~found.used) < 65
+    ph = np.einsum("jik,ji->jk", found.toward[readings.bin], readings.h)
+    expected = np.einsum("jk,jk->j", ph, readings.h)
+    np.testing.assert_allclose(found.expected, expected, rtol=1e-9)
+    scale = np.abs(ph).max(axis=0)
+    np.testing.assert_allclose(found.gain[~found.used] / scale, ph[~found.used] / scale, atol=1e-9)
 
 
 def test_the_gate_gives_a_wild_reading_no_weight_and_no_say_in_the_likelihood() -> None:
@@ -190,8 +202,10 @@ def test_a_place_that_is_lost_may_be_anywhere_and_goes_on_as_fast_as_before() ->
     np.testing.assert_array_equal(np.flatnonzero(found.lost), [132])
     assert not found.used[200:264].any()
     assert found.used[264:].mean() > 0.99
-    again = forward(moves, readings, _begin(), gate=Gate(anywhere=1e-3), allowed=found.used, lost=found.lost)
-    smoothed = backward(moves, readings, again, wanted=SLOPES)
+    again = forward(
+        moves, readings, _begin(), gate=Gate(anywhere=1e-3), allowed=found.used, lost=found.lost, wanted=SLOPES
+    )
+    smoothed = backward(moves, readings, again)
     assert np.abs(smoothed.mean[:, 0] / STEP_M - 5e-3).max() < 5e-3
     # without the patience it stays lost, for this prior does not believe in such a jump
     assert not forward(moves, readings, _begin(), gate=Gate(5.0)).used[200:].any()

@@ -7,7 +7,7 @@ import pytest
 
 from gramoscope.tonearm.groove_prior import GroovePrior, start, taylor
 from gramoscope.tonearm.linear_gaussian import Gate, Moves, Readings, blank, forward
-from gramoscope.tonearm.steady_likelihood import steady_log_likelihood
+from gramoscope.tonearm.steady_likelihood import one_after_the_other, steady_log_likelihood
 
 STEP_M = 3.1e-6
 SIGMA_M = 6e-8
@@ -22,7 +22,34 @@ def _both(prior: GroovePrior, bins: np.ndarray, value: np.ndarray, variance: np.
     count = int(bins[-1]) + 1
     moves = Moves(a[None, None], sigma**2 * q[None, None], np.zeros(count, np.int64), np.ones(count))
     long = forward(moves, readings, blank(covariance), gate=Gate(4.0)).log_likelihood
-    return long, steady_log_likelihood(a, sigma**2 * q, covariance, bins, value, variance, h[0], gate=4.0)
+    short = steady_log_likelihood(
+        (a, q),
+        prior.at_rest(STEP_M),
+        one_after_the_other([(bins, value, variance)]),
+        np.array([sigma]),
+        place_sigma_m=1e-4,
+        gate=4.0,
+    )
+    return long, short
+
+
+def test_stretches_know_nothing_of_each_other() -> None:
+    prior, rng = GroovePrior(5000.0, 3e4, 6e4, 0.03, 1.0, 2e-4), np.random.default_rng(2)
+    stretches = [(np.arange(n), 2e-7 * rng.normal(size=n), np.full(n, SIGMA_M**2)) for n in (70, 41)]
+    sigma = np.array([0.02, 0.05])
+
+    def likelihood(some: slice) -> float:
+        return steady_log_likelihood(
+            prior.steps(STEP_M),
+            prior.at_rest(STEP_M),
+            one_after_the_other(stretches[some]),
+            sigma[some],
+            place_sigma_m=1e-4,
+            gate=4.0,
+        )
+
+    apart = likelihood(slice(0, 1)) + likelihood(slice(1, 2))
+    assert likelihood(slice(0, 2)) == pytest.approx(apart, rel=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -67,7 +67,8 @@ def film(
     level_cm_s
         Velocity of the groove, rms over the passage.
     characteristic
-        Recording characteristic to cut with: flat (the default), riaa, aes, nab, european-78, …
+        Recording characteristic to cut with: flat (the default), any other that `gramoscope characteristics` lists, or free
+        entry such as 300R-12.7, as in `gramoscope play`.
     texture
         What covers the walls: aluminium powder, natural shellac, or next to nothing.
     damage

@@ -13,10 +13,12 @@ from importlib.metadata import version
 
 import cyclopts
 
+from gramoscope.cli.characteristics import characteristics
 from gramoscope.cli.compare import compare
 from gramoscope.cli.demo import demo
 from gramoscope.cli.film import film
 from gramoscope.cli.info import info
+from gramoscope.cli.pack import pack
 from gramoscope.cli.play import play
 from gramoscope.cli.recipe import recipe
 from gramoscope.cli.terminal import BAD_INPUT, FINE, INTERRUPTED, show_error
@@ -34,7 +36,8 @@ app = cyclopts.App(
 
     - `gramoscope demo` films a sound of its own, plays the film and says how well that went;
     - `gramoscope film SOUND CAPTURE` films any sound file;
-    - `gramoscope play CAPTURE --out DIR` plays a film.
+    - `gramoscope play CAPTURE --out DIR` plays a film;
+    - `gramoscope pack DIR` makes a package for an archive of it.
 
     Exit codes: 0 all is well; 1 `info` found something wrong; 2 the command cannot work as given; 130 stopped by Ctrl-C.
     """,
@@ -44,7 +47,7 @@ app = cyclopts.App(
     result_action="return_value",
     default_parameter=cyclopts.Parameter(negative=()),
 )
-for command in (demo, film, play, compare, info, recipe):
+for command in (demo, film, play, compare, info, recipe, characteristics, pack):
     app.command(command)
 
 

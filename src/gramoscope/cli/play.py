@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from gramoscope.cli.terminal import FINE, FINITE, PROCESSORS, Terminal, Workers, several
 
@@ -20,7 +20,13 @@ def play(
     recipe: str = "best",
     rate: int = 96_000,
     characteristic: str | None = None,
+    declick: bool = False,
+    decrackle: bool = False,
+    rumble_hz: Annotated[float | None, FINITE] = None,
     flac: bool = False,
+    rpm: str | None = None,
+    speed_curve: Path | None = None,
+    remove_wow: bool = False,
     full_scale_cm_s: Annotated[float, FINITE] = 50.0,
     title: str = "",
     originator: str = "",
@@ -29,6 +35,7 @@ def play(
     again: Path | None = None,
     force: bool = False,
     workers: Workers = PROCESSORS,
+    device: Literal["cpu", "cuda"] = "cpu",
     quiet: bool = False,
     json: bool = False,
 ) -> int:
@@ -38,6 +45,10 @@ def play(
     `walls.wav` (outer and inner wall for themselves), `vertical.wav` (up and down), `equalised.wav`, each Broadcast Wave of
     24 bit with its SHA-256 beside it; `report.html` (how good it is, for people), `report.json` (the same for machines) and
     `groove.png`.
+
+    Repairs are made only when asked for, and can be undone: `flat.wav` stays as it is, and `repaired.wav`, `difference.wav`
+    (what was taken off), `cues.json` and `labels.txt` (where, the latter for Audacity) come beside it. `equalised.wav` is then
+    made of the repaired sound.
 
     What the film does not show (a chipped wall, a lost frame) is bridged, flagged and counted in the report.
 
@@ -53,10 +64,27 @@ def play(
     rate
         Samples a second.
     characteristic
-        Recording characteristic to undo in `equalised.wav`: riaa, flat, aes, nab, columbia-lp, european-78, … As the capture
-        says when left out, riaa (as in the paper) if it does not.
+        Recording characteristic to undo in `equalised.wav`: a name (riaa, flat, aes, decca-ffrr, …) or turnover in Hz, shelf
+        and roll-off in dB at 10 kHz, as collectors write them: 500N-16, 300R-12.7, 250N-0. `gramoscope characteristics` lists
+        names and letters, and looks up a label and a year. As the capture says when left out, riaa (as in the paper) if it
+        does not.
+    declick
+        Replace clicks by what their surroundings predict, with the pickup's flags as witnesses.
+    decrackle
+        Take small pulses near the noise off.
+    rumble_hz
+        Take off what lies below so many hertz, say 20.
     flac
         Write every sound as FLAC too: the same samples in about half the room.
+    rpm
+        The speed at which the record was meant to turn: a number, or 78-us (78.26), 78-europe (77.92), 76-us (76.60), 80, 45,
+        33-third (or 33⅓), 16-two-thirds, pathe (90). As the capture says when left out.
+    speed_curve
+        CSV file with the header `time_s,rpm`: the speed over time, in the seconds of the sound that comes out; straight
+        lines between the rows, the same before the first and after the last. In place of `--rpm`.
+    remove_wow
+        Measure how far the hole is off centre, and remove its wow if that is sure; the passage must cover most of a turn. A
+        survey of the passage comes first and takes time. Without it the wow is measured and told, and nothing is done.
     full_scale_cm_s
         Groove velocity at full scale (0 dBFS). The same for all files and for quiet and loud records alike: nothing is
         normalised. What lies beyond is clipped, counted and told.
@@ -76,6 +104,9 @@ def play(
         With --again: go on although the capture is not the one that was played.
     workers
         Stretches read at the same time; one for each processor when left out. The result does not depend on it.
+    device
+        What reads: cpu, or cuda, a graphics card by NVIDIA (needs `pip install "gramoscope[gpu]"`; recipe best only; so far
+        checked in CUDA's simulator, not on a card). Both agree to rounding.
     quiet
         Say nothing.
     json
@@ -88,9 +119,11 @@ def play(
     from gramoscope.apparatus.capture import open_capture
     from gramoscope.errors import ArgumentError
     from gramoscope.player.catalogue import Catalogue
+    from gramoscope.player.devices import device_named
     from gramoscope.player.play import Settings
     from gramoscope.player.play import play as play_capture
-    from gramoscope.player.recipe import load_recipe
+    from gramoscope.player.recipe import load_recipe, with_repairs
+    from gramoscope.player.speed import Speed
 
     if capture is None or out is None:
         raise ArgumentError(
@@ -100,9 +133,11 @@ def play(
     opened = open_capture(capture)
     name = characteristic or opened.bench.disc.characteristic or "riaa"
     catalogue = Catalogue(title=title, originator=originator, reference=reference, description=description)
-    settings = Settings(float(rate), name, workers, full_scale_cm_s / 100, flac, catalogue)
+    chosen = with_repairs(load_recipe(recipe), declick=declick, decrackle=decrackle, rumble_hz=rumble_hz)
+    speed, where = Speed.chosen(rpm, speed_curve, remove_wow=remove_wow), device_named(device)
+    settings = Settings(float(rate), name, workers, full_scale_cm_s / 100, flac, catalogue, speed, where)
     with terminal.progress("Playing") as progress:
-        report = play_capture(opened, load_recipe(recipe), out, settings, progress=progress)
+        report = play_capture(opened, chosen, out, settings, progress=progress)
     terminal.result(report)
     tell(terminal, report, out)
     return FINE
@@ -113,14 +148,18 @@ def tell(terminal: Terminal, report: Mapping[str, Any], out: Path) -> None:
     noise, share, level = report["noise_estimate"], report["share"], report["level"]
     rows = {
         "played": f"{report['seconds']:.3f} s in {report['elapsed_s']:.1f} s, recipe {report['recipe'].get('name', '?')}",
+        "speed": _speed(report["speed"]),
         "groups": _groups(report),
         "measured": f"{share['measured']:.1%} of the sound; {share['interpolated']:.1%} interpolated and flagged",
         "level": f"{level['rms_cm_s']:.2f} cm/s rms, {level['peak_cm_s']:.1f} cm/s peak",
         "noise": f"{noise['sigma_rms_cm_s']:.2f} cm/s rms by the error bars, {_below(noise)}",
         "equalised": f"{report['files']['equalised.wav']['characteristic']}",
+        **({"repaired": _repairs(report)} if report["repair"] else {}),
         "files": "  ".join(str(out / name) for name in _names(report)),
     }
     terminal.table(rows)
+    for hint in filter(None, (hint.get("words") for hint in report["hints"].values())):
+        terminal.say(f"[yellow]Hint:[/] {hint}")
     for remark in report["remarks"]:
         terminal.say(f"[yellow]Note:[/] {remark}")
     for problem in report["problems"][:5]:
@@ -132,7 +171,21 @@ def tell(terminal: Terminal, report: Mapping[str, Any], out: Path) -> None:
 
 def _names(report: Mapping[str, Any]) -> list[str]:
     sounds = [[name, *([file["flac"]["name"]] if "flac" in file else [])] for name, file in report["files"].items()]
-    return [*(name for names in sounds for name in names), "groove.png", "report.html", "report.json"]
+    cues = report["repair"]["cues"] if report["repair"] else {}
+    lists = [cues[which] for which in ("name", "labels") if which in cues]
+    return [*(name for names in sounds for name in names), *lists, "groove.png", "report.html", "report.json"]
+
+
+def _repairs(report: Mapping[str, Any]) -> str:
+    spans, seconds = report["repair"]["spans"], report["repair"]["seconds"]
+    told = [f"{several(number, 'span')} by {kind} ({seconds[kind] * 1e3:.1f} ms)" for kind, number in spans.items()]
+    return "; ".join(told) or "nothing was found"
+
+
+def _speed(speed: Mapping[str, Any]) -> str:
+    if speed["curve"] is not None:
+        return f"{min(speed['curve']['rpm']):g} to {max(speed['curve']['rpm']):g} rpm, as {speed['chosen']} says"
+    return f"{speed['rpm']:.5g} rpm" + (f"; the capture says {speed['capture_rpm']:g}" if speed["chosen"] else "")
 
 
 def _groups(report: Mapping[str, Any]) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -84,6 +84,16 @@ class Terminal:
         table.add_column()
         for name, value in rows.items():
             table.add_row(name, value)
+        Console().print(table, highlight=False)
+
+    def columns(self, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+        """Print a table with heads for people."""
+        if self.quiet or self.json:
+            return
+        table = Table(*heads, box=None, pad_edge=False, header_style="bold")
+        table.columns[0].no_wrap, table.columns[0].style = True, "cyan"
+        for row in rows:
+            table.add_row(*row)
         Console().print(table, highlight=False)
 
     def result(self, values: Mapping[str, Any]) -> None:

@@ -16,11 +16,13 @@ IEC 60098:1987, section on recording characteristics (RIAA and N78 time constant
 Restoration Techniques, British Library, 2008, chapter 6. J. Powell and R. Stehle, Playback Equalizer Settings for 78 RPM
 Recordings, 1993. G. Galo, Disc recording equalization demystified, ARSC Journal 27, 1996. IASA TC-04, section 5.2. The
 table follows the compilation of the Audacity support pages. Machines of the era kept to their curve within 2 or 3 dB.
+Who cut with which, and when, stands in `gramoscope.disc.recorded_with`.
 """
 
 from __future__ import annotations
 
 import difflib
+import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -83,7 +85,6 @@ class Characteristic:
         Below it the bass was cut softer, 6 dB an octave; None for none.
     rolloff_hz : float or None
         Above it the treble was cut louder, 6 dB an octave; None for none.
-    where_when : str
     """
 
     name: str
@@ -91,7 +92,6 @@ class Characteristic:
     shelf_hz: float | None = None
     turnover_hz: float | None = None
     rolloff_hz: float | None = None
-    where_when: str = ""
 
     def __post_init__(self) -> None:
         for what, corner in (("shelf", self.shelf_hz), ("turnover", self.turnover_hz), ("roll-off", self.rolloff_hz)):
@@ -109,6 +109,13 @@ class Characteristic:
     def is_flat(self) -> bool:
         """Whether the record was cut without any tilt."""
         return self.turnover_hz is None and self.rolloff_hz is None
+
+    @property
+    def rolloff_db(self) -> float:
+        """How far playback falls at 10 kHz as the collectors' tables state it, R = 10 lg(1 + (10 kHz/f₃)²); 0 for none."""
+        if self.rolloff_hz is None:
+            return 0.0
+        return float(10 * np.log10(1 + (ROLLOFF_STATED_AT_HZ / self.rolloff_hz) ** 2))
 
     def recording_response(self, frequency_hz: npt.ArrayLike) -> ComplexArray:
         """Return the response of the cutter on the velocity, 1/P, 0 dB at 1 kHz.
@@ -155,54 +162,62 @@ class Characteristic:
         return np.asarray(tilt, np.complex128)
 
 
-FLAT = Characteristic("flat", "acoustic, or no equalisation", where_when="before about 1925; flat transfers")
+FLAT = Characteristic("flat", "acoustic, or no equalisation")
 
-RIAA = Characteristic(
-    "riaa", "RIAA, 500R-13.7", corner_hz(3180), corner_hz(318), corner_hz(75), "microgroove since 1955"
-)
+RIAA = Characteristic("riaa", "RIAA, 500R-13.7", corner_hz(3180), corner_hz(318), corner_hz(75))
 
 CHARACTERISTICS: tuple[Characteristic, ...] = (
     FLAT,
     RIAA,
-    Characteristic("european-78", "European 78, 250N-0", None, 250, None, "Europe 1926–46"),
-    Characteristic("blumlein", "Blumlein, 300N-0", None, 300, None, "Great Britain 1927–46"),
-    Characteristic("500n-0", "500N-0", None, 500, None, "Great Britain and US 1926–50"),
-    Characteristic("american-6", "American 78, 250N-6", None, 250, 5900, "US 1926–51"),
-    Characteristic("american-8", "American 78, 250N-8", None, 250, 4400, "US 1926–51"),
-    Characteristic("columbia-78", "Columbia 78, 300N-16", None, 300, corner_hz(100), "CBS 1938–48"),
-    Characteristic("old-rca", "old RCA, 800N-8", None, 800, 4340, "RCA 1941–47"),
-    Characteristic("decca-ffrr", "Decca ffrr, 300N-5.5", None, 300, corner_hz(25), "Decca 1944–56"),
-    Characteristic("ccir", "CCIR, 350N-10.5", None, corner_hz(450), corner_hz(50), "Germany 1952–55"),
-    Characteristic(
-        "iec-78",
-        "IEC N78, 350A-10.5",
-        corner_hz(3180),
-        corner_hz(450),
-        corner_hz(50),
-        "coarse groove since 1955, BS 1928",
-    ),
-    Characteristic("telefunken", "Telefunken, 400N-0", None, 400, None, "1929–55"),
-    Characteristic("capitol", "Capitol, 400N-12.7", None, 400, rolloff_corner_hz(12.7), "1942–53"),
-    Characteristic("aes", "AES, 400N-12.3", None, 400, 2500, "US 1951–58, Decca US 1937–46, Mercury"),
-    Characteristic("mgm", "MGM, 500N-12", None, 500, rolloff_corner_hz(12), "since 1946"),
-    Characteristic("rca", "RCA, 500N-13.7", None, 500, corner_hz(75), "RCA 1931–52"),
-    Characteristic("nab", "NAB, 500N-16", None, 500, corner_hz(100), "transcriptions"),
-    Characteristic("nab-shelf", "NAB, 500B-16", 50, 500, corner_hz(100), "transcriptions"),
-    Characteristic("columbia-lp", "Columbia LP, 500C-16", corner_hz(1590), corner_hz(318), corner_hz(100), "1948–56"),
-    Characteristic("london-lp", "London LP, 500C-10.5", corner_hz(1590), corner_hz(318), corner_hz(50), "1949–56"),
+    Characteristic("european-78", "European 78, 250N-0", None, 250),
+    Characteristic("blumlein", "Blumlein, 300N-0", None, 300),
+    Characteristic("500n-0", "500N-0", None, 500),
+    Characteristic("american-6", "American 78, 250N-6", None, 250, 5900),
+    Characteristic("american-8", "American 78, 250N-8", None, 250, 4400),
+    Characteristic("columbia-78", "Columbia 78, 300N-16", None, 300, corner_hz(100)),
+    Characteristic("old-rca", "old RCA, 800N-8", None, 800, 4340),
+    Characteristic("decca-ffrr", "Decca ffrr, 300N-5.5", None, 300, corner_hz(25)),
+    Characteristic("ccir", "CCIR, 350N-10.5", None, corner_hz(450), corner_hz(50)),
+    Characteristic("iec-78", "IEC N78, 350A-10.5", corner_hz(3180), corner_hz(450), corner_hz(50)),
+    Characteristic("telefunken", "Telefunken, 400N-0", None, 400),
+    Characteristic("capitol", "Capitol, 400N-12.7", None, 400, rolloff_corner_hz(12.7)),
+    Characteristic("aes", "AES, 400N-12.3", None, 400, 2500),
+    Characteristic("mgm", "MGM, 500N-12", None, 500, rolloff_corner_hz(12)),
+    Characteristic("rca", "RCA, 500N-13.7", None, 500, corner_hz(75)),
+    Characteristic("nab", "NAB, 500N-16", None, 500, corner_hz(100)),
+    Characteristic("nab-shelf", "NAB, 500B-16", 50, 500, corner_hz(100)),
+    Characteristic("columbia-lp", "Columbia LP, 500C-16", corner_hz(1590), corner_hz(318), corner_hz(100)),
+    Characteristic("london-lp", "London LP, 500C-10.5", corner_hz(1590), corner_hz(318), corner_hz(50)),
 )
 """The curves, after the sources in the module's head."""
 
 ALIASES = {"acoustic": "flat", "none": "flat", "bs-1928": "iec-78", "ffrr": "decca-ffrr"}
 
+SHELVES_HZ = {"N": None, "R": corner_hz(3180), "B": 50.0, "C": 100.0, "A": 50.0}
+"""The letters of the collectors' notation."""
+TURNOVER_LIMITS_HZ = (50.0, 5000.0)
+LOWEST_SHELF_HZ = 5.0
+STEEPEST_ROLLOFF_DB = 30.0
+"""Beyond these a notation is taken for a slip of the hand."""
+
+_NUMBER = r"(\d+(?:\.\d+)?)"
+_NOTATION = re.compile(rf"{_NUMBER}(?:([NRBCA])|S{_NUMBER})-{_NUMBER}(?:DB)?")
+_HOW_TO_WRITE = (
+    "turnover in Hz, a letter for the shelf, roll-off in dB at 10 kHz: 500N-16 (N none, R 50.05 Hz, B or A 50, C 100; "
+    "S70 any other: 300S70-16)"
+)
+
 
 def characteristic(name: str) -> Characteristic:
-    """Return the characteristic of that name.
+    """Return the characteristic of that name, or the one that the collectors' notation describes.
 
     Parameters
     ----------
     name : str
-        One of `CHARACTERISTICS` or `ALIASES`; capitals, blanks and underscores do not matter.
+        One of `CHARACTERISTICS` or `ALIASES`; capitals, blanks and underscores do not matter. Or turnover in hertz, shelf and
+        roll-off in decibels at 10 kHz: `500N-16`, `250N-0`, `500R-13.7`, `300S70-16`, as in `SHELVES_HZ`; a turnover or
+        a roll-off of 0 is none. A notation that stands in the table is the curve of the table, with the time constants
+        that it rounds: `350A-10.5` is `iec-78`, whose turnover is 353.7 Hz.
 
     Returns
     -------
@@ -218,6 +233,51 @@ def characteristic(name: str) -> Characteristic:
     wanted = ALIASES.get(wanted, wanted)
     if wanted in known:
         return known[wanted]
+    if wanted[:1].isdecimal():
+        return _of_notation(name)
     near = difflib.get_close_matches(wanted, [*known, *ALIASES], n=3, cutoff=0.4)
     remedy = f"did you mean {' or '.join(near)}?" if near else "riaa for microgroove, flat when nobody knows"
-    raise ArgumentError(f"no recording characteristic is called {name!r}", f"one of {', '.join(known)}", remedy)
+    raise ArgumentError(
+        f"no recording characteristic is called {name!r}", f"one of {', '.join(known)}, or {_HOW_TO_WRITE}", remedy
+    )
+
+
+def _of_notation(text: str) -> Characteristic:
+    parts = _parts_of(text)
+    require(parts is not None, f"the recording characteristic {text!r}", _HOW_TO_WRITE)
+    assert parts is not None
+    for curve in CHARACTERISTICS:
+        if _parts_of(curve.title.split(", ")[-1]) == parts:
+            return curve
+    return _free_entry(*parts)
+
+
+def _parts_of(text: str) -> tuple[float, float | None, str, float] | None:
+    """Turnover in Hz, shelf in Hz, how the shelf is written, roll-off in dB; None if the text is no notation."""
+    plain = re.sub(r"\s", "", text).translate(str.maketrans("–−,", "--.")).upper()
+    if not (match := _NOTATION.fullmatch(plain)):
+        return None
+    turnover_hz, letter, other_shelf_hz, rolloff_db = match.groups()
+    if letter is None:
+        return float(turnover_hz), float(other_shelf_hz), f"S{float(other_shelf_hz):g}", float(rolloff_db)
+    return float(turnover_hz), SHELVES_HZ[letter], letter, float(rolloff_db)
+
+
+def _free_entry(turnover_hz: float, shelf_hz: float | None, shelf: str, rolloff_db: float) -> Characteristic:
+    notation = f"{turnover_hz:g}{shelf}-{rolloff_db:g}"
+    lowest, highest = TURNOVER_LIMITS_HZ
+    possible = turnover_hz == 0 or lowest <= turnover_hz <= highest
+    require(possible, f"{notation}: a turnover of {turnover_hz:g} Hz", f"{lowest:g} … {highest:g} Hz, or 0 for none")
+    require(
+        rolloff_db <= STEEPEST_ROLLOFF_DB,
+        f"{notation}: a roll-off of {rolloff_db:g} dB",
+        f"0 … {STEEPEST_ROLLOFF_DB:g} dB at 10 kHz",
+    )
+    require(
+        shelf_hz is None or shelf_hz >= LOWEST_SHELF_HZ,
+        f"{notation}: a shelf {shelf}",
+        f"a shelf at {LOWEST_SHELF_HZ:g} Hz or more, or N for none",
+    )
+    corner = rolloff_corner_hz(rolloff_db) if rolloff_db else None
+    free = Characteristic(notation.lower(), notation, shelf_hz, turnover_hz or None, corner)
+    return FLAT if free.is_flat else free

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gramoscope.conventions import BoolArray, Float32Array, FloatArray
+from gramoscope.pickup.device import Kept
 from gramoscope.pickup.registration import cubic_taps, placement
 from gramoscope.signal_path import ImageArray
 
@@ -31,7 +32,8 @@ class Overlay:
     Attributes
     ----------
     columns : float32 array, shape (column, row)
-        Grey levels, in the coordinates of the first frame, extended forward by the last shift; 0 where not wanted.
+        Grey levels, in the coordinates of the first frame, extended forward by the last shift; 0 where not wanted. Lies
+        where the device that drew it keeps it (`pickup.device`).
     frames : int64 array, shape (column,)
         How many frames each column rests on.
     shift_px : float64 array, shape (frame,)
@@ -40,7 +42,7 @@ class Overlay:
         Which frames of the group were used.
     """
 
-    columns: Float32Array
+    columns: Kept
     frames: npt.NDArray[np.int64]
     shift_px: FloatArray
     frame_index: npt.NDArray[np.int64]
@@ -169,10 +171,7 @@ def overlay(
     """
     height, width = images.shape[1:]
     canvas_width = overlay_width(width, shift_px)
-    counts = np.zeros(canvas_width, np.int64)
-    for shift in shift_px:
-        start, stop, _, _ = placement(float(shift), width, canvas_width)
-        counts[start:stop] += 1
+    counts = frames_in(width, shift_px)
     columns = np.zeros((canvas_width, height), np.float32)
     tiles = all_tiles((height, canvas_width)) if wanted is None else wanted
     share = (1 / np.maximum(counts, 1)).astype(np.float32)
@@ -185,22 +184,56 @@ def overlay(
     return Overlay(columns, counts, shift_px, frame_index)
 
 
+def frames_in(width: int, shift_px: FloatArray) -> npt.NDArray[np.int64]:
+    """Return how many frames of such a width each column of their overlay rests on."""
+    counts = np.zeros(overlay_width(width, shift_px), np.int64)
+    for shift in shift_px:
+        start, stop, _, _ = placement(float(shift), width, counts.size)
+        counts[start:stop] += 1
+    return counts
+
+
 def overlay_width(width: int, shift_px: FloatArray) -> int:
     """Return how many columns an overlay has, of frames that have so many."""
     return width + int(np.floor(shift_px.max(initial=0.0)))
 
 
-SLOPE_REACH = 4
+@numba.njit(cache=True, nogil=True)
+def _brighter(column, level):  # type: ignore[no-untyped-def]
+    count = 0
+    for row in range(column.size):
+        count += column[row] >= level
+    return count
 
 
-def _slope_taps() -> Float32Array:
-    """The derivative of a Gaussian of one pixel: weights of x₁ − x₋₁ … x₄ − x₋₄, exact for a straight line."""
-    k = np.arange(1, SLOPE_REACH + 1)
-    taps = k * np.exp(-0.5 * k**2)
-    return np.asarray(taps / np.sum(2 * k * taps), np.float32)
+@numba.njit(cache=True, nogil=True)
+def places_brighter(columns, level):  # type: ignore[no-untyped-def]
+    """Return column and row of all points of a picture, [column, row], that reach a level, shape (place, 2)."""
+    counts = np.empty(len(columns), np.int64)
+    for x in range(len(columns)):
+        counts[x] = _brighter(columns[x], level)
+    places, n = np.empty((counts.sum(), 2), np.int64), 0
+    for seen in np.flatnonzero(counts):
+        for row in range(columns.shape[1]):
+            if columns[seen, row] >= level:
+                places[n, 0], places[n, 1] = seen, row
+                n += 1
+    return places
 
 
-_SLOPE_TAPS = _slope_taps()
+GAUSSIAN_REACH = 4
+
+
+def _gaussian_taps() -> tuple[Float32Array, Float32Array]:
+    """A Gaussian of one pixel from its middle on, and the weights of x₁ − x₋₁ … x₄ − x₋₄ in its derivative."""
+    k = np.arange(GAUSSIAN_REACH + 1)
+    bell = np.exp(-0.5 * k**2)
+    bell /= 2 * bell.sum() - bell[0]
+    slope = k[1:] * bell[1:]
+    return bell.astype(np.float32), (slope / np.sum(2 * k[1:] * slope)).astype(np.float32)
+
+
+_BELL, _SLOPE = _gaussian_taps()
 
 
 @numba.njit(cache=True, nogil=True, fastmath={"contract"})
@@ -209,24 +242,40 @@ def _add_difference(w, after, before, out):  # type: ignore[no-untyped-def]
         out[j] += w * (after[j] - before[j])
 
 
+@numba.njit(cache=True, nogil=True, fastmath={"contract"})
+def _smooth(wide, w, out):  # type: ignore[no-untyped-def]
+    """Smooth by five taps from the middle on; `wide` has four more values at either end."""
+    n = out.size
+    far, mid, near, next_, here = wide[:n], wide[1 : n + 1], wide[2 : n + 2], wide[3 : n + 3], wide[4 : n + 4]
+    after, beyond, past, last = wide[5 : n + 5], wide[6 : n + 6], wide[7 : n + 7], wide[8 : n + 8]
+    w0, w1, w2, w3, w4 = w[0], w[1], w[2], w[3], w[4]
+    for j in range(n):
+        inner = w0 * here[j] + w1 * (next_[j] + after[j]) + w2 * (near[j] + beyond[j])
+        out[j] = inner + w3 * (mid[j] + past[j]) + w4 * (far[j] + last[j])
+
+
 @numba.njit(cache=True, nogil=True)
-def _slope(columns, taps, slope):  # type: ignore[no-untyped-def]
+def _slope_along(columns, slope):  # type: ignore[no-untyped-def]
     width, height = columns.shape
-    one = np.empty(height, np.float32)
+    reach = GAUSSIAN_REACH
+    wide, smooth = np.empty(height + 2 * reach, np.float32), np.empty(height, np.float32)
     for x in range(width):
-        one[:] = np.float32(0)
-        for k in range(1, taps.size + 1):
-            _add_difference(taps[k - 1], columns[min(x + k, width - 1)], columns[max(x - k, 0)], one)
-        slope[:, x] = one
+        wide[:] = np.float32(0)
+        here = wide[reach : reach + height]
+        for k in range(1, reach + 1):
+            _add_difference(_SLOPE[k - 1], columns[min(x + k, width - 1)], columns[max(x - k, 0)], here)
+        wide[:reach], wide[reach + height :] = here[0], here[-1]
+        _smooth(wide, _BELL, smooth)
+        slope[:, x] = smooth
 
 
 def slope_along(columns: Float32Array) -> Float32Array:
-    """Return the derivative of a picture along the groove, by that of a Gaussian of one pixel.
+    """Return the derivative of a picture along the groove, by that of a Gaussian of one pixel in both directions.
 
     Parameters
     ----------
     columns : float32 array, shape (column, row)
-        Beyond its ends the last column is held.
+        Beyond its ends the outermost values are held.
 
     Returns
     -------
@@ -234,5 +283,5 @@ def slope_along(columns: Float32Array) -> Float32Array:
         Grey levels a pixel.
     """
     slope = np.empty(columns.shape[::-1], np.float32)
-    _slope(columns, _SLOPE_TAPS, slope)
+    _slope_along(columns, slope)
     return slope

@@ -14,6 +14,7 @@ carry texture.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
@@ -29,6 +30,10 @@ STRIP_REACH_PX = 40
 """Strips for matching stretches reach so far beyond their nominal overlap."""
 CONVERGED_PX = 1e-3
 """Steps of the shift search below this are no longer worth a round."""
+LARGEST_STEP_PX = 0.5
+REACH_PX = 3.0
+"""How far from its expectation a shift is believed."""
+ROUNDS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +104,7 @@ def _add_row(before, here, after, beyond, taps, weight, total, moment):  # type:
 @numba.njit(cache=True, nogil=True)
 def placement(shift_px: float, width: int, canvas_width: int) -> tuple[int, int, int, float]:
     """Canvas columns [start, stop) that a frame covers, its column minus theirs, and the fraction between."""
-    offset = int(np.floor(-shift_px))
+    offset = int(math.floor(-shift_px))  # noqa: RUF046  CUDA has this floor only, and its is a float
     fraction = -shift_px - offset
     start = max(0, 1 - offset)
     stop = min(canvas_width, width - 2 - offset)
@@ -257,8 +262,8 @@ def pair_shift_px(
     *,
     expected_px: float,
     rows: npt.NDArray[np.int64],
-    reach_px: float = 3.0,
-    rounds: int = 12,
+    reach_px: float = REACH_PX,
+    rounds: int = ROUNDS,
 ) -> float:
     """Return how far the record turned from one frame to a later one, by least-squares flow along the groove.
 
@@ -284,7 +289,7 @@ def pair_shift_px(
     """
     shift = expected_px
     for _ in range(rounds):
-        step = float(np.clip(_shift_correction(here, there, rows, shift), -0.5, 0.5))
+        step = float(np.clip(_shift_correction(here, there, rows, shift), -LARGEST_STEP_PX, LARGEST_STEP_PX))
         shift += step
         if not abs(shift - expected_px) <= reach_px or shift < 0:
             return float("nan")
@@ -310,17 +315,28 @@ def frame_shifts(group: FrameGroup) -> tuple[FloatArray, FloatArray]:
         nominal step is used in `shift_px`).
     """
     index = np.flatnonzero(group.valid)
-    nominal = group.arc_start_m / group.pixel_pitch_m
     rows = textured_rows(group.images[index[0]])
+    expected_px = expected_steps_px(group)
+    found_px = [
+        pair_shift_px(group.images[a], group.images[b], expected_px=expected, rows=rows)
+        for (a, b), expected in zip(pairwise(index), expected_px.tolist(), strict=True)
+    ]
+    return added_up(group, expected_px, np.array(found_px))
+
+
+def expected_steps_px(group: FrameGroup) -> FloatArray:
+    """Return how far the record should have turned from each valid frame to the next, 0 or more."""
+    return np.maximum(np.diff(group.arc_start_m[group.valid] / group.pixel_pitch_m), 0.0)
+
+
+def added_up(group: FrameGroup, expected_px: FloatArray, found_px: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return what `frame_shifts` does, of the steps that were expected and found (or NaN) between valid frames."""
+    index = np.flatnonzero(group.valid)
+    shift_px = np.concatenate([[0.0], np.cumsum(np.where(np.isnan(found_px), expected_px, found_px))])
     step_m = np.full(max(group.images.shape[0] - 1, 0), np.nan)
-    shift = np.zeros(index.size)
-    for i, (a, b) in enumerate(pairwise(index)):
-        expected = max(float(nominal[b] - nominal[a]), 0.0)
-        found = pair_shift_px(group.images[a], group.images[b], expected_px=expected, rows=rows)
-        shift[i + 1] = shift[i] + (expected if np.isnan(found) else found)
-        if b == a + 1:
-            step_m[a] = found * group.pixel_pitch_m
-    return shift, step_m
+    neighbours = np.diff(index) == 1
+    step_m[index[:-1][neighbours]] = found_px[neighbours] * group.pixel_pitch_m
+    return shift_px, step_m
 
 
 def registered(group: FrameGroup) -> tuple[Canvas, FloatArray]:

@@ -17,18 +17,20 @@ from scipy import ndimage
 
 from gramoscope.apparatus.bench import Bench
 from gramoscope.camera.exposure import Exposure
-from gramoscope.conventions import INNER, OUTER, BoolArray, Float32Array, FloatArray, IntArray
+from gramoscope.conventions import INNER, OUTER, Float32Array, FloatArray, IntArray
 from gramoscope.errors import require
 from gramoscope.pickup.cartridge import Line, Sketch, Spread
-from gramoscope.pickup.overlay import TILE_COLUMNS, Overlay, overlay, overlay_width, slope_along, tiles_about
-from gramoscope.pickup.registration import frame_shifts, overlap_textures, strip_columns
+from gramoscope.pickup.device import Device, Film
+from gramoscope.pickup.overlay import TILE_COLUMNS, Overlay, overlay_width, slope_along, tiles_about
+from gramoscope.pickup.processor import Processor
+from gramoscope.pickup.registration import overlap_textures, strip_columns
 from gramoscope.pickup.texture.calibration import aligned_layout, calibration_of
 from gramoscope.pickup.texture.following import TAPS, wide_rows
 from gramoscope.pickup.texture.groove_search import GrooveSearch
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.learning import Learning, Lesson
 from gramoscope.pickup.texture.reading import Evidence, Model, Rules, read, settled, spaced
-from gramoscope.pickup.texture.sharpness import CELL_PX, sharpness
+from gramoscope.pickup.texture.sharpness import CELL_PX
 from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.quality import Quality, no_flags
 from gramoscope.signal_path import FrameGroup, Texture, WallTrace
@@ -63,6 +65,8 @@ class TextureLikelihood:
         Stripes are not read nearer to the glass edge than this (beyond the window's own half height).
     exposure, search, learning, rules
         The steps; see each.
+    device : Device
+        On which groups are read. Learning, once a passage, is the processor's.
     """
 
     bench: Bench
@@ -73,6 +77,7 @@ class TextureLikelihood:
     search: GrooveSearch = field(default_factory=GrooveSearch)
     learning: Learning = field(default_factory=Learning)
     rules: Rules = field(default_factory=Rules)
+    device: Device = field(default_factory=Processor)
 
     def __post_init__(self) -> None:
         require(self.learn_groups >= 1, f"learning from {self.learn_groups} groups", "at least one")
@@ -117,7 +122,7 @@ class TextureLikelihood:
 
         def prepared(i: int) -> Stretch:
             film, _ = self.exposure.sort_out(group(seen[i].number))
-            return pickup.stretch(film, seen[i], paths[i])[0]
+            return pickup.stretch(Processor().film(film), seen[i], paths[i])[0]
 
         stretches = list(spread(prepared, range(len(seen))))
         told(numbers.size)
@@ -131,7 +136,7 @@ class TextureLikelihood:
     def sight(self, group: FrameGroup) -> Sight | None:
         """Return what the coarse search needs of a group; None when no frame is usable."""
         film, _ = self.exposure.sort_out(group)
-        return sight_of(film) if film.valid.any() else None
+        return sight_of(Processor().film(film)) if film.valid.any() else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,10 +160,10 @@ class Sight:
     sharp: Float32Array
 
 
-def sight_of(group: FrameGroup) -> Sight:
-    """Return a group at first sight, by its valid frames, of which there must be one."""
-    shift_px, step_m = frame_shifts(group)
-    return Sight(group.number, shift_px, step_m, sharpness(group.usable_images, shift_px))
+def sight_of(film: Film) -> Sight:
+    """Return a group at first sight, by its valid frames."""
+    shift_px, step_m = film.device.frame_shifts(film)
+    return Sight(film.group.number, shift_px, step_m, film.device.sharpness(film, shift_px))
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,24 +214,25 @@ class TexturePickup:
             return self._lost(group, exposure_flags, group.problems)
         if not self.taught:
             return self._lost(group, exposure_flags, (*group.problems, f"group {group.number} is not read: {UNTAUGHT}"))
-        sight = sight_of(group)
-        stretch, laid = self.stretch(group, sight, self.searched(sight))
+        film = self.cartridge.device.film(group)
+        sight = sight_of(film)
+        stretch, laid = self.stretch(film, sight, self.searched(sight))
         path, found = read(stretch, self.models_for(group.number), self.cartridge.bench.disc.cut, self.cartridge.rules)
-        head, tail = self.strips(laid, group)
+        head, tail = self.strips(laid, film)
         return replace(self._trace(group, path, found, exposure_flags, sight.step_m), head=head, tail=tail)
 
     def searched(self, sight: Sight) -> Coarse:
         """Return where the coarse search finds both walls, and how sharp each stripe; see `GrooveSearch.find`."""
         return self.cartridge.search.find(sight.sharp, self.layout, cut=self.cartridge.bench.disc.cut)
 
-    def strips(self, laid: Overlay, group: FrameGroup) -> tuple[Texture | None, Texture | None]:
+    def strips(self, laid: Overlay, film: Film) -> tuple[Texture | None, Texture | None]:
         """Return the texture at both ends of a group's mean, by which it is matched with its neighbours."""
         return overlap_textures(
-            group,
+            film.group,
             first=int(laid.frame_index[0]),
             width=laid.columns.shape[0],
             group_step_m=self.cartridge.bench.sequence.group_step_m,
-            texture_of=lambda columns: slope_along(laid.columns[columns]),
+            texture_of=lambda columns: slope_along(film.device.part(laid.columns, columns)),
         )
 
     @property
@@ -239,8 +245,9 @@ class TexturePickup:
         group, _ = self.cartridge.exposure.sort_out(group)
         if not group.valid.any() or not self.taught:
             return None
-        sight = sight_of(group)
-        begun, _ = self.stretch(group, sight, self.searched(sight))
+        film = self.cartridge.device.film(group)
+        sight = sight_of(film)
+        begun, _ = self.stretch(film, sight, self.searched(sight))
         stretch, found = read(begun, self.models_for(group.number), self.cartridge.bench.disc.cut, self.cartridge.rules)
         image = group.images[int(np.flatnonzero(group.valid)[0])]
         model = self.lessons[-1].whole
@@ -256,17 +263,17 @@ class TexturePickup:
                 lines.append(Line(name, rows[number, : image.shape[1]], measured[: image.shape[1]]))
         return Sketch(image, tuple(lines))
 
-    def stretch(self, group: FrameGroup, sight: Sight, coarse: Coarse) -> tuple[Stretch, Overlay]:
+    def stretch(self, film: Film, sight: Sight, coarse: Coarse) -> tuple[Stretch, Overlay]:
         """Lay a stretch ready: draw the coarse paths column by column, and the picture about the stripes.
 
         Parameters
         ----------
-        group : FrameGroup
-            At least one frame valid.
+        film : Film
         sight : Sight
         coarse : (float64 array, shape (2, cell); float64 array, shape (stripe, cell))
             Paths of the walls and support of the stripes, as `searched` finds them.
         """
+        group, device = film.group, film.device
         width = overlay_width(group.images.shape[2], sight.shift_px)
         x = np.arange(width)
         cell: FloatArray = (np.arange(coarse[0].shape[1], dtype=np.float64) + 0.5) * CELL_PX - 0.5
@@ -282,9 +289,10 @@ class TexturePickup:
         for end in strip_columns(group, width=width, group_step_m=self.cartridge.bench.sequence.group_step_m):
             tiles = slice(end.start // TILE_COLUMNS, -(-end.stop // TILE_COLUMNS))
             wanted[:, tiles] = wanted[:, tiles].any(axis=1, keepdims=True)
-        laid = overlay(group.usable_images, sight.shift_px, np.flatnonzero(group.valid), wanted)
+        laid = device.overlay(film, sight.shift_px, np.flatnonzero(group.valid), wanted)
         usable = laid.frames * 2 >= laid.frames.max()
-        return Stretch(laid.columns, usable, burnt_places(laid, group.white_level), path, support), laid
+        burnt = device.places_brighter(laid.columns, NEARLY_WHITE * group.white_level)
+        return Stretch(laid.columns, usable, burnt, path, support, device=device), laid
 
     def models_for(self, number: int) -> list[Model]:
         """Return the models by which a group is read, round by round: none that the group itself has taught."""
@@ -342,12 +350,6 @@ SUPPORT_CELLS = 4.0
 """Smoothing of the support: one cell of texture is a poor witness."""
 UNSEEN = Quality.NO_STRIPE | Quality.INTERPOLATED
 UNTAUGHT = "too little of the stripes is seen to learn their texture; the recipe seed-paper reads single groups"
-
-
-def burnt_places(laid: Overlay, white_level: int) -> BoolArray:
-    """Return what is burnt out, shape (column, row); of no rows when nothing is."""
-    burnt = laid.columns >= NEARLY_WHITE * white_level
-    return burnt if burnt.any() else burnt[:, :0]
 
 
 def samples_of(stretch: Stretch, found: Evidence) -> tuple[FloatArray, FloatArray]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 from gramoscope.apparatus.bench import Bench
-from gramoscope.disc.formats import Disc
 from gramoscope.listening.broadcast_metadata import (
     DESCRIPTION,
     ORIGINATOR,
@@ -63,11 +63,11 @@ def metadata_of(
     words, disc, program = settings.catalogue, bench.disc, f"Gramoscope {version('gramoscope')}"
     title = words.title or disc.notes.get("title", "")
     reference = words.reference or ascii_text(capture_name)[:REFERENCE]
-    description = _description(words.description or _record(title, disc), track, settings)
-    medium = f"gramophone record; {bench.rotation.rpm:g} rpm; {disc.cut} cut"
-    done = (
-        f"{program}; optical; recipe {recipe.name}; {track.done(settings)}; full scale {settings.full_scale_m_s:g} m/s"
-    )
+    description = _description(words.description or record_in_words(title, disc.notes), track, settings)
+    medium = f"gramophone record; {settings.speed.rotation_of(bench.rotation).in_words()}; {disc.cut} cut"
+    steps = track.done(settings, recipe)
+    told = (f"recipe {recipe.name}", settings.speed.done(bench.rotation), steps)
+    done = "; ".join([program, "optical", *filter(None, told), f"full scale {settings.full_scale_m_s:g} m/s"])
     mode = "mono" if len(track.channels) == 1 else "dual-mono"
     made = words.made.astimezone(UTC)
     label = " ".join(disc.notes[name] for name in ("label", "matrix", "side") if name in disc.notes)
@@ -91,14 +91,22 @@ def metadata_of(
             "IMED": medium,
             "ICRD": made.strftime("%Y-%m-%d"),
             "ISFT": program,
-            "ICMT": f"{track.what}; {track.done(settings)}",
+            "ICMT": f"{track.what}; {steps}",
         },
     )
 
 
-def _record(title: str, disc: Disc) -> str:
-    """What is known of the record, in a line."""
-    notes = {**disc.notes, "title": title}
+def record_in_words(title: str, notes: Mapping[str, str]) -> str:
+    """Return what is known of a record, in a line; empty if nothing is.
+
+    Parameters
+    ----------
+    title : str
+        Of the recording.
+    notes : mapping
+        As in `gramoscope.disc.formats.Disc`; its title does not count.
+    """
+    notes = {**notes, "title": title}
     return ", ".join(
         notes[name] for name in ("title", "performer", "label", "matrix", "side", "date") if notes.get(name)
     )

@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 
 from gramoscope.conventions import BoolArray, FloatArray
+from gramoscope.player.hints import Hints
 from gramoscope.player.quality_meter import QualityMeter
 from gramoscope.quality import NOT_MEASURED, Quality, count
 from gramoscope.signal_path import Audio, GrooveMotion, WallTrace
 from gramoscope.tonearm.splice import Match
+from gramoscope.turntable.hole_gauge import HoleGauge
 
 MOST_PROBLEMS = 200
 """So many problems are told one by one; the rest is counted."""
@@ -56,8 +58,18 @@ def _extremes(runs: FloatArray) -> FloatArray:
 
 @dataclass
 class Monitor:
-    """Counts and sums over a transfer; `quality` gathers the statement of quality beside them."""
+    """Counts and sums over a transfer.
 
+    Parameters
+    ----------
+    gauge, hints : HoleGauge and Hints, optional
+        Look on, and are asked in the end.
+    quality : QualityMeter, optional
+        Gathers the statement of quality.
+    """
+
+    gauge: HoleGauge | None = None
+    hints: Hints | None = None
     quality: QualityMeter | None = None
     groups: int = 0
     groups_lost: list[int] = field(default_factory=list)
@@ -109,8 +121,10 @@ class Monitor:
         self.frame_step_sum_m += float(steps.sum())
         self.frame_step_square_m2 += float((steps**2).sum())
 
-    def spliced(self, match: Match | None) -> None:
+    def spliced(self, match: Match | None, trace: WallTrace | None = None) -> None:
         """Take note of how a stretch fits the one before."""
+        if self.gauge is not None and trace is not None:
+            self.gauge.see(trace, match.error_m if match is not None else float("nan"))
         if match is None:
             return
         if np.isnan(match.error_m):
@@ -127,6 +141,8 @@ class Monitor:
         """Take note of a piece of the flat transfer."""
         if self.quality is not None:
             self.quality.heard(piece)
+        if self.hints is not None:
+            self.hints.hear(piece)
         measured = (piece.flags & np.uint16(NOT_MEASURED)) == 0
         self.samples += piece.samples.size
         self.interpolated += int(piece.samples.size - np.count_nonzero(measured))

@@ -16,8 +16,9 @@ from gramoscope.listening.broadcast_metadata import BroadcastMetadata
 from gramoscope.listening.ink import save_png
 from gramoscope.listening.report import json_text
 from gramoscope.listening.whole_file import written_whole
-from gramoscope.player.track_file import TrackFile
-from gramoscope.player.tracks import Track
+from gramoscope.player.cue_list import CUES, LABELS, CueList
+from gramoscope.player.track_file import TrackFile, files_of
+from gramoscope.player.tracks import REPAIR_TRACKS, Track
 from gramoscope.signal_path import Audio
 
 REPORT, PAGE, PICTURE = "report.json", "report.html", "groove.png"
@@ -36,7 +37,7 @@ class Outputs:
     folder : Path
         Made if it does not exist.
     tracks : mapping of Track to BroadcastMetadata
-        The sound files, and what each says of itself.
+        The sound files, and what each says of itself. With those of a repair there are lists of what it touched, `cues`.
     rate_hz : float
     full_scale_m_s : float
         The velocity that is ±1 in every file.
@@ -62,6 +63,7 @@ class Outputs:
         self._tracks = tracks
         self._rate_hz, self._full_scale_m_s, self._flac = rate_hz, full_scale_m_s, flac
         self._files: dict[Track, TrackFile] = {}
+        self.cues: CueList | None = None
         self._made: list[Path] = []
 
     def __enter__(self) -> Self:
@@ -79,6 +81,8 @@ class Outputs:
                         flac=self._flac,
                     )
                     undo.callback(self._files[track].discard)
+                if set(REPAIR_TRACKS) & set(self._tracks):
+                    self.cues = CueList(self.folder, rate_hz=self._rate_hz)
             undo.pop_all()
         return self
 
@@ -107,6 +111,8 @@ class Outputs:
         """Finish all sound under temporary names; return what became of each file, for the report."""
         for file in self._files.values():
             file.complete()
+        if self.cues is not None:
+            self.cues.finish()
         return {track.name: file.as_dict() for track, file in self._files.items()}
 
     def finish(self, report: Mapping[str, Any], picture: Figure, page: str) -> None:
@@ -125,18 +131,32 @@ class Outputs:
             # transfer, so the old one goes first and the new one comes last, when the block ends
             for name in (REPORT, PAGE):
                 (self.folder / name).unlink(missing_ok=True)
-            for file in self._files.values():
-                file.retire_older()
+            self._retire_older()
             for file in self._files.values():
                 file.commit()
+            if self.cues is not None:
+                self.cues.commit()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         for file in self._files.values():
             file.discard()
+        if self.cues is not None:
+            self.cues.discard()
         if kind is not None:
             self._remove_made()
+
+    def _retire_older(self) -> None:
+        """Take away what an earlier transfer left and this one does not replace."""
+        for file in self._files.values():
+            file.retire_older()
+        for track in set(REPAIR_TRACKS) - set(self._files):
+            for path in files_of(self.folder, track):
+                path.unlink(missing_ok=True)
+        if self.cues is None:
+            for name in (CUES, LABELS):
+                (self.folder / name).unlink(missing_ok=True)
 
     def _make_folder(self) -> None:
         self._made = [path for path in (self.folder, *self.folder.parents) if not path.exists()]

@@ -10,6 +10,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -22,7 +23,11 @@ from gramoscope.errors import CaptureError, require
 from gramoscope.listening.broadcast_wave import FULL_SCALE_M_S
 from gramoscope.listening.flac import HIGHEST_RATE_HZ as HIGHEST_FLAC_RATE_HZ
 from gramoscope.pickup.cartridge import Pickup
+from gramoscope.pickup.device import Device
+from gramoscope.pickup.processor import PROCESSOR
 from gramoscope.player.catalogue import Catalogue, metadata_of
+from gramoscope.player.centring import surveyed
+from gramoscope.player.hints import Hints
 from gramoscope.player.monitor import OVERVIEW_POINTS, Monitor
 from gramoscope.player.outputs import Outputs
 from gramoscope.player.picture import groove_picture, worst_places
@@ -31,13 +36,27 @@ from gramoscope.player.quality_meter import QualityMeter
 from gramoscope.player.quality_page import quality_page
 from gramoscope.player.recipe import Recipe
 from gramoscope.player.report import transfer_report
-from gramoscope.player.tracks import EQUALISED, FLAT, TRACKS, VERTICAL, WALLS, alone, vertical
+from gramoscope.player.speed import Speed
+from gramoscope.player.tracks import (
+    DIFFERENCE,
+    EQUALISED,
+    FLAT,
+    REPAIRED,
+    VERTICAL,
+    WALLS,
+    alone,
+    left_of_repair,
+    taken_by_repair,
+    tracks_of,
+    vertical,
+)
 from gramoscope.player.workers import in_order, spreading
 from gramoscope.preamp.equalisation import Equaliser
 from gramoscope.preamp.resample import Resampler
 from gramoscope.preamp.walls import WallSplitter, in_direction
 from gramoscope.signal_path import Audio, WallTrace
 from gramoscope.tonearm.follow import Tonearm
+from gramoscope.turntable.hole_gauge import HoleGauge
 
 
 class Progress(Protocol):
@@ -65,6 +84,10 @@ class Settings:
         Write every sound as FLAC too.
     catalogue : Catalogue
         The archive's words.
+    speed : Speed
+        How fast the record shall turn.
+    device : Device
+        On which groups are read; results agree to rounding.
     """
 
     rate_hz: float = 96_000.0
@@ -73,6 +96,8 @@ class Settings:
     full_scale_m_s: float = FULL_SCALE_M_S
     flac: bool = False
     catalogue: Catalogue = field(default_factory=Catalogue)
+    speed: Speed = field(default_factory=Speed)
+    device: Device = PROCESSOR
 
     def __post_init__(self) -> None:
         possible = 1000 <= self.rate_hz <= 1_000_000 and self.rate_hz == round(self.rate_hz)
@@ -130,30 +155,34 @@ def play(
     """
     started = time.perf_counter()
     bench, direction = capture.bench, direction_of_cut(capture.bench.disc.cut)
+    rotation = settings.speed.rotation_of(bench.rotation)
     equaliser = Equaliser(characteristic(settings.characteristic_name))
-    tonearm = Tonearm(bench.rotation, direction, bench.disc.wall_angle_rad, bench.passage_length_m, recipe.smoother)
-    resampler = Resampler(bench.rotation, settings.rate_hz, recipe.passband)
+    tonearm = Tonearm(rotation, direction, bench.disc.wall_angle_rad, bench.passage_length_m, recipe.smoother)
+    resampler = Resampler(rotation, settings.rate_hz, recipe.passband)
     hashes, monitor = InputHashes(), _monitor(capture, tonearm, resampler)
 
     with _outputs(capture, recipe, folder, settings) as files:
-        pickup = learned(capture, recipe, settings.workers, progress=progress)
+        pickup = learned(capture, recipe, settings.workers, device=settings.device, progress=progress)
+        centring = surveyed(capture, pickup, settings.workers, asked=settings.speed.remove_wow)
         traces = _picked_up(capture, pickup, settings.workers, hashes, monitor, progress)
-        motion = monitor.followed(tonearm.follow(_spliced(traces, recipe, monitor)))
+        motion = monitor.followed(tonearm.follow(_spliced(centring.centred(traces), recipe, monitor)))
         sound = files.kept(WALLS, resampler.resample(motion), WallSplitter(direction, pickup.walls).split)
         sound = files.kept(VERTICAL, sound, vertical)
         flat = files.kept(FLAT, _heard((in_direction(piece, direction) for piece in sound), monitor), alone)
-        for _ in files.kept(EQUALISED, equaliser.equalise(flat), alone):
+        for _ in files.kept(EQUALISED, equaliser.equalise(_repaired(flat, recipe, files, settings)), alone):
             pass
         _require_sound(monitor)
-        elapsed_s, sounds = time.perf_counter() - started, files.complete()
-        report = transfer_report(capture, recipe, pickup, settings, hashes, monitor, sounds, folder, elapsed_s)
+        elapsed_s = time.perf_counter() - started
+        report = transfer_report(capture, recipe, pickup, settings, hashes, monitor, centring, files, folder, elapsed_s)
         report |= judge(report) if judge is not None else {}
         picture = groove_picture(capture, pickup, monitor, rate_hz=settings.rate_hz, recipe_name=recipe.name)
         files.finish(report, picture, quality_page(report, worst_places(capture, pickup, monitor)))
     return report
 
 
-def learned(capture: Capture, recipe: Recipe, workers: int, *, progress: Progress | None = None) -> Pickup:
+def learned(
+    capture: Capture, recipe: Recipe, workers: int, *, device: Device = PROCESSOR, progress: Progress | None = None
+) -> Pickup:
     """Return the recipe's cartridge, fitted to a capture, as it is after learning the passage.
 
     Parameters
@@ -161,11 +190,13 @@ def learned(capture: Capture, recipe: Recipe, workers: int, *, progress: Progres
     capture : Capture
     recipe : Recipe
     workers : int
+    device : Device
+        On which it will read.
     progress : callable, optional
         Told how much is done, of how much, and of what.
     """
     with spreading(workers) as spread:
-        cartridge = recipe.cartridge_for(capture.bench)
+        cartridge = recipe.cartridge_for(capture.bench, device)
 
         def told(done: int, total: int) -> None:
             if progress is not None:
@@ -193,7 +224,7 @@ def _picked_up(
 
 def _spliced(traces: Iterator[WallTrace], recipe: Recipe, monitor: Monitor) -> Iterator[WallTrace]:
     for trace, match in recipe.splice.join(traces):
-        monitor.spliced(match)
+        monitor.spliced(match, trace)
         yield trace
 
 
@@ -203,17 +234,30 @@ def _heard(pieces: Iterator[Audio], monitor: Monitor) -> Iterator[Audio]:
         yield piece
 
 
+def _repaired(pieces: Iterator[Audio], recipe: Recipe, files: Outputs, settings: Settings) -> Iterator[Audio]:
+    """Repair what is asked for; what is left and what was taken off are kept."""
+    if files.cues is None:
+        yield from pieces
+        return
+    left, taken = (partial(part, full_scale_m_s=settings.full_scale_m_s) for part in (left_of_repair, taken_by_repair))
+    pairs = files.kept(REPAIRED, recipe.repair.repair(pieces, files.cues.note), left)
+    for _, repaired in files.kept(DIFFERENCE, pairs, taken):
+        yield repaired
+
+
 def _outputs(capture: Capture, recipe: Recipe, folder: Path, settings: Settings) -> Outputs:
     name = capture.folder.resolve().name
-    tracks = {track: metadata_of(track, capture.bench, recipe, settings, capture_name=name) for track in TRACKS}
+    tracks = {
+        track: metadata_of(track, capture.bench, recipe, settings, capture_name=name) for track in tracks_of(recipe)
+    }
     return Outputs(folder, tracks, rate_hz=settings.rate_hz, full_scale_m_s=settings.full_scale_m_s, flac=settings.flac)
 
 
 def _monitor(capture: Capture, tonearm: Tonearm, resampler: Resampler) -> Monitor:
-    bench, rate_hz = capture.bench, resampler.rate_hz
-    samples = float(bench.rotation.time_of_arc_s(bench.passage_length_m)) * rate_hz
+    bench, rotation, rate_hz = capture.bench, resampler.rotation, resampler.rate_hz
+    samples = float(rotation.time_of_arc_s(bench.passage_length_m)) * rate_hz
     quality = QualityMeter(tonearm, bench.disc.cut, rate_hz=rate_hz, passband=resampler.passband, samples=samples)
-    monitor = Monitor(quality)
+    monitor = Monitor(HoleGauge(bench.rotation), Hints(rotation.rpm, rate_hz), quality)
     monitor.overview.samples_per_point = max(1, int(np.ceil(samples / OVERVIEW_POINTS)))
     return monitor
 

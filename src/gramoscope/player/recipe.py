@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
+from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass, replace
 from difflib import get_close_matches
 from importlib import resources
 from pathlib import Path
@@ -19,12 +19,18 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from gramoscope.apparatus.bench import Bench
 from gramoscope.errors import ArgumentError, require
 from gramoscope.pickup.cartridge import Cartridge
+from gramoscope.pickup.device import Device
 from gramoscope.pickup.flow.flow_method import FlowMethod
 from gramoscope.pickup.flow.horn_schunck import GrooveHornSchunck, HornSchunck
 from gramoscope.pickup.flow.multigrid_horn_schunck import MultigridHornSchunck
+from gramoscope.pickup.processor import PROCESSOR
 from gramoscope.pickup.seed_paper import SeedPaperPickup
 from gramoscope.pickup.texture_likelihood import TextureLikelihood
+from gramoscope.preamp.declick import Declicker
+from gramoscope.preamp.decrackle import Decrackler
+from gramoscope.preamp.repair import Repair
 from gramoscope.preamp.resample import DEFAULT_PASSBAND
+from gramoscope.preamp.rumble import RumbleFilter
 from gramoscope.tonearm.follow import KalmanSmoother, PlaceSmoother, Smoother
 from gramoscope.tonearm.splice import Splice
 
@@ -39,6 +45,7 @@ _FLOWS: dict[str, type[FlowMethod]] = {
     "multigrid-horn-schunck": MultigridHornSchunck,
 }
 _SMOOTHERS: dict[str, type[KalmanSmoother] | type[PlaceSmoother]] = {"slopes": KalmanSmoother, "places": PlaceSmoother}
+_REPAIRS: dict[str, type[Any]] = {"declick": Declicker, "decrackle": Decrackler, "rumble": RumbleFilter}
 # what a table that names none gets
 _CARTRIDGE, _FLOW, _SMOOTHER = "seed-paper", "groove-horn-schunck", "slopes"
 Part = TypeVar("Part")
@@ -59,6 +66,8 @@ class Recipe:
     smoother : KalmanSmoother or PlaceSmoother
     passband : float
         Of the resampler.
+    repair : Repair
+        Nothing, unless there are tables `[preamp.declick]`, `[preamp.decrackle]` or `[preamp.rumble]`, which may be empty.
     """
 
     name: str
@@ -68,10 +77,20 @@ class Recipe:
     splice: Splice = field(default_factory=Splice)
     smoother: Smoother = field(default_factory=KalmanSmoother)
     passband: float = DEFAULT_PASSBAND
+    repair: Repair = field(default_factory=Repair)
 
-    def cartridge_for(self, bench: Bench) -> Cartridge:
-        """Return the cartridge, fitted to an apparatus."""
-        return _CARTRIDGES[self.cartridge](bench, **self.pickup)
+    def cartridge_for(self, bench: Bench, device: Device = PROCESSOR) -> Cartridge:
+        """Return the cartridge, fitted to an apparatus, reading on a device; ArgumentError if it has no kernels for it."""
+        kind = _CARTRIDGES[self.cartridge]
+        if issubclass(kind, TextureLikelihood):
+            return kind(bench, **self.pickup, device=device)
+        require(
+            device == PROCESSOR,
+            f"the recipe {self.name!r} on {device.name}",
+            "a recipe of the cartridge texture-likelihood, which has kernels for it",
+            "--recipe best, or leave --device out",
+        )
+        return kind(bench, **self.pickup)
 
 
 def shipped_recipes() -> tuple[str, ...]:
@@ -126,7 +145,7 @@ def recipe_of_table(table: Mapping[str, Any]) -> Recipe:
     _only(table, ("name", "about", "pickup", "tonearm", "preamp"), "the recipe")
     pickup, tonearm, preamp = (_table(table, key) for key in ("pickup", "tonearm", "preamp"))
     _only(tonearm, ("splice", "smoother"), "[tonearm]")
-    _only(preamp, ("passband",), "[preamp]")
+    _only(preamp, ("passband", *_REPAIRS), "[preamp]")
     name, parameters = _cartridge_of_table(pickup)
     return Recipe(
         name=_checked(str, table.get("name", "unnamed"), "name"),
@@ -136,6 +155,13 @@ def recipe_of_table(table: Mapping[str, Any]) -> Recipe:
         splice=build(Splice, _table(tonearm, "splice"), "[tonearm.splice]"),
         smoother=_chosen(_SMOOTHERS, _SMOOTHER, _table(tonearm, "smoother"), "[tonearm.smoother]"),
         passband=_checked(float, preamp.get("passband", DEFAULT_PASSBAND), "[preamp] passband"),
+        repair=Repair(
+            **{
+                name: build(kind, _table(preamp, name), f"[preamp.{name}]")
+                for name, kind in _REPAIRS.items()
+                if name in preamp
+            }
+        ),
     )
 
 
@@ -154,12 +180,29 @@ def table_of_recipe(recipe: Recipe) -> dict[str, Any]:
         "about": recipe.about,
         "pickup": {"cartridge": recipe.cartridge, **pickup},
         "tonearm": {"splice": asdict(recipe.splice), "smoother": _table_of_chosen(_SMOOTHERS, recipe.smoother)},
-        "preamp": {"passband": recipe.passband},
+        "preamp": {"passband": recipe.passband, **_table_of_repair(recipe.repair)},
     }
 
 
+def _table_of_repair(repair: Repair) -> dict[str, Any]:
+    return {name: asdict(part) for name in _REPAIRS if (part := getattr(repair, name)) is not None}
+
+
+def with_repairs(recipe: Recipe, *, declick: bool, decrackle: bool, rumble_hz: float | None) -> Recipe:
+    """Return the recipe with repairs added, where it has none of its own, as they come; ArgumentError for a bad corner."""
+    own = recipe.repair
+    return replace(
+        recipe,
+        repair=Repair(
+            declick=own.declick or (Declicker() if declick else None),
+            decrackle=own.decrackle or (Decrackler() if decrackle else None),
+            rumble=own.rumble if rumble_hz is None else RumbleFilter(corner_hz=rumble_hz),
+        ),
+    )
+
+
 def _parameters(kind: type[Any]) -> tuple[str, ...]:
-    return tuple(f.name for f in fields(kind) if f.name != "bench")
+    return tuple(f.name for f in fields(kind) if f.name not in ("bench", "device"))
 
 
 def _cartridge_of_table(table: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:

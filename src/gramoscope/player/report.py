@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gramoscope.apparatus.capture import Capture
+from gramoscope.disc.characteristics import characteristic
 from gramoscope.disc.formats import direction_of_cut
 from gramoscope.pickup.cartridge import Pickup
 from gramoscope.player.calibration_check import calibration_check
+from gramoscope.player.centring import Centring
 from gramoscope.player.monitor import Monitor
 from gramoscope.player.provenance import (
     InputHashes,
@@ -23,10 +25,12 @@ from gramoscope.player.provenance import (
 )
 from gramoscope.player.recipe import Recipe
 from gramoscope.player.response import response_of
-from gramoscope.player.tracks import EQUALISED
+from gramoscope.player.tracks import EQUALISED, FLAT, REPAIRED
 from gramoscope.quality import Quality, describe
+from gramoscope.turntable.hole_gauge import HoleGauge
 
 if TYPE_CHECKING:
+    from gramoscope.player.outputs import Outputs
     from gramoscope.player.play import Settings
 
 REPORT_FORMAT = "gramoscope-report/1"
@@ -39,12 +43,18 @@ def transfer_report(
     settings: Settings,
     hashes: InputHashes,
     monitor: Monitor,
-    files: Mapping[str, Mapping[str, Any]],
+    centring: Centring,
+    outputs: Outputs,
     folder: Path,
     elapsed_s: float,
 ) -> dict[str, Any]:
     """Return the report of a transfer into a folder as numbers, texts, arrays, lists and dicts; docs/reference/report.md."""
-    seconds, seen = monitor.samples / settings.rate_hz, monitor.as_dict()
+    seconds, files, seen = monitor.samples / settings.rate_hz, outputs.complete(), monitor.as_dict()
+    repair = None if outputs.cues is None else outputs.cues.as_dict(recipe.repair)
+    curve = characteristic(settings.characteristic_name).name
+    equalised = {"characteristic": curve, "made_of": (FLAT if repair is None else REPAIRED).name}
+    gauge = monitor.gauge or HoleGauge(capture.bench.rotation)
+    hole = gauge.finding()
     return {
         "format": REPORT_FORMAT,
         "made": settings.catalogue.made.isoformat(),
@@ -57,21 +67,25 @@ def transfer_report(
         "layout": capture.layout,
         "seconds": seconds,
         "rate_hz": settings.rate_hz,
+        "speed": settings.speed.as_dict(capture.bench.rotation),
+        "wow": centring.as_dict(hole),
+        "hints": monitor.hints.as_dict() if monitor.hints else {},
         "direction": direction_of_cut(capture.bench.disc.cut),
         "walls_read": list(pickup.walls),
-        "remarks": [*_remarks(capture, pickup.walls), *_clipped(files)],
+        "remarks": [*_remarks(capture, pickup.walls), *centring.remarks(hole), *_clipped(files)],
         "calibration": dict(pickup.calibration),
         "calibration_check": calibration_check(capture.bench, pickup.calibration, seen),
         **seen,
-        "speed": None,
         "response": response_of(settings.characteristic_name, rate_hz=settings.rate_hz),
         "files": {
             **files,
-            EQUALISED.name: {**files[EQUALISED.name], "characteristic": settings.characteristic_name},
+            EQUALISED.name: {**files[EQUALISED.name], **equalised},
         },
+        "repair": repair,
         "flags": {str(flag.name).lower(): describe(flag) for flag in Quality},
         "capture_problems": list(capture.problems),
         "recipe": recipe_of(recipe),
+        "device": settings.device.name,
         "bench": bench_of(capture),
         "inputs": hashes.as_dict(capture),
         "versions": versions(),

@@ -25,6 +25,13 @@ def sum_beside(path: Path) -> Path:
     return path.with_name(f"{path.name}.sha256")
 
 
+def files_of(folder: Path, track: Track) -> tuple[Path, ...]:
+    """Return all files that a track may have: sound, FLAC, and the sum of each."""
+    wav = folder / track.name
+    flac = wav.with_suffix(".flac")
+    return wav, sum_beside(wav), flac, sum_beside(flac)
+
+
 class TrackFile:
     """Writes one track under temporary names, and puts it in place with its sum.
 
@@ -55,7 +62,7 @@ class TrackFile:
         self.track = track
         self.wav = folder / track.name
         self.flac = self.wav.with_suffix(".flac") if flac else None
-        self._beside = [sum_beside(self.wav), self.wav.with_suffix(".flac"), sum_beside(self.wav.with_suffix(".flac"))]
+        self._beside = files_of(folder, track)[1:]
         for path in self._beside:
             # found out now, and not when hours of reading are done
             if path.is_dir():

@@ -6,24 +6,33 @@ Whatever shall be written beside these is declared here, and passes through `Out
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from gramoscope.disc.characteristics import characteristic
+from gramoscope.listening.reversible import reversible
 from gramoscope.preamp.equalisation import history_line
 from gramoscope.preamp.walls import WALL_CHANNELS
 from gramoscope.signal_path import Audio, GrooveSound
 
 if TYPE_CHECKING:
     from gramoscope.player.play import Settings
+    from gramoscope.player.recipe import Recipe
+
+Pair = tuple[Audio, Audio]
+"""A piece of sound as it came, and as it is after repair."""
 
 
-def _nothing(_: Settings) -> str:
+def _nothing(_: Settings, __: Recipe) -> str:
     return "not equalised; nothing repaired"
 
 
-def _equalisation(settings: Settings) -> str:
-    return history_line(characteristic(settings.characteristic_name))
+def _repair(_: Settings, recipe: Recipe) -> str:
+    return "; ".join(["not equalised", *recipe.repair.history])
+
+
+def _equalisation(settings: Settings, recipe: Recipe) -> str:
+    return "; ".join([*recipe.repair.history, history_line(characteristic(settings.characteristic_name))])
 
 
 @dataclass(frozen=True)
@@ -39,13 +48,13 @@ class Track:
     channels : tuple of str
         What each channel is.
     done : callable
-        What was done to the sound on the way from the groove, in words, by the settings.
+        What was done to the sound on the way from the groove, in words, by the settings and the recipe.
     """
 
     name: str
     what: str
     channels: tuple[str, ...] = ("groove",)
-    done: Callable[[Settings], str] = _nothing
+    done: Callable[[Settings, Recipe], str] = _nothing
 
 
 FLAT = Track("flat.wav", "velocity of the groove in the direction of the cut")
@@ -58,7 +67,17 @@ VERTICAL = Track("vertical.wav", "vertical velocity of the groove, positive upwa
 EQUALISED = Track(
     "equalised.wav", "velocity of the groove in the direction of the cut, characteristic undone", done=_equalisation
 )
+REPAIRED = Track("repaired.wav", "flat.wav after repair", done=_repair)
+DIFFERENCE = Track(
+    "difference.wav", "what was taken off: as whole numbers, repaired.wav + difference.wav = flat.wav", done=_repair
+)
 TRACKS = (FLAT, WALLS, VERTICAL, EQUALISED)
+REPAIR_TRACKS = (REPAIRED, DIFFERENCE)
+
+
+def tracks_of(recipe: Recipe) -> tuple[Track, ...]:
+    """Return the tracks of a transfer: those of a repair only where one is asked for."""
+    return (*TRACKS, *REPAIR_TRACKS) if recipe.repair.asked else TRACKS
 
 
 def alone(piece: Audio) -> tuple[Audio, ...]:
@@ -69,3 +88,15 @@ def alone(piece: Audio) -> tuple[Audio, ...]:
 def vertical(piece: GrooveSound) -> tuple[Audio, ...]:
     """Return the vertical motion as the one channel of a file."""
     return (piece.vertical,)
+
+
+def left_of_repair(pair: Pair, *, full_scale_m_s: float) -> tuple[Audio, ...]:
+    """Return the repaired sound as the one channel of a file."""
+    raw, repaired = pair
+    return (replace(repaired, samples=reversible(raw.samples, repaired.samples, full_scale_m_s=full_scale_m_s)[0]),)
+
+
+def taken_by_repair(pair: Pair, *, full_scale_m_s: float) -> tuple[Audio, ...]:
+    """Return what a repair took off as the one channel of a file."""
+    raw, repaired = pair
+    return (replace(repaired, samples=reversible(raw.samples, repaired.samples, full_scale_m_s=full_scale_m_s)[1]),)

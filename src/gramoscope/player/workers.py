@@ -15,7 +15,13 @@ Task = TypeVar("Task")
 Answer = TypeVar("Answer")
 
 
-def in_order(work: Callable[[Task], Answer], tasks: Iterable[Task], *, workers: int) -> Iterator[Answer]:
+AHEAD = 48
+"""So many answers may wait for one that takes long, or for whoever uses them, who may think for a while now and then."""
+
+
+def in_order(
+    work: Callable[[Task], Answer], tasks: Iterable[Task], *, workers: int, ahead: int = AHEAD
+) -> Iterator[Answer]:
     """Yield the answers to tasks in the order of the tasks.
 
     Parameters
@@ -24,7 +30,9 @@ def in_order(work: Callable[[Task], Answer], tasks: Iterable[Task], *, workers: 
         Called from several threads at once; must not depend on the order of calls.
     tasks : iterable
     workers : int
-        Threads; at most one task more than this is begun or waiting at a time.
+        Threads, each with one task at a time.
+    ahead : int
+        At most so many tasks are begun or answered and not yet asked for, or one more than there are workers.
 
     Yields
     ------
@@ -41,7 +49,7 @@ def in_order(work: Callable[[Task], Answer], tasks: Iterable[Task], *, workers: 
     try:
         for task in tasks:
             pending.append(pool.submit(work, task))
-            if len(pending) > workers:
+            if len(pending) > max(workers, ahead):
                 yield pending.popleft().result()
         while pending:
             yield pending.popleft().result()

@@ -14,7 +14,7 @@ import numpy as np
 
 from gramoscope.disc.characteristic_filter import playback_filter
 from gramoscope.disc.characteristics import RIAA, Characteristic
-from gramoscope.preamp.pieces import in_order, without_nan
+from gramoscope.preamp.pieces import in_order, joined, part_of, without_nan
 from gramoscope.quality import no_flags
 from gramoscope.signal_path import Audio
 
@@ -60,36 +60,16 @@ class Equaliser:
             return
         undo = playback_filter(self.characteristic, rate_hz=first.rate_hz)
         done = (*first.history, history_line(self.characteristic))
-        waiting = replace(_part_of(first, 0, 0), history=done)
+        waiting = replace(part_of(first, 0, 0), history=done)
         state, late_by, gain = undo.at_rest(), undo.look_ahead, undo.rms_gain
         for piece in map(without_nan, chain([first], pieces, [_silence(undo.look_ahead, after=first)])):
             late, state = undo.advance(piece.samples, state)
             samples = late[late_by:]
             late_by -= late.size - samples.size
-            waiting = _behind(waiting, replace(piece, sigma=piece.sigma * gain))
+            waiting = joined(waiting, replace(piece, sigma=piece.sigma * gain))
             if samples.size:
-                yield replace(_part_of(waiting, 0, samples.size), samples=samples)
-            waiting = _part_of(waiting, samples.size, None)
-
-
-def _part_of(piece: Audio, start: int, stop: int | None) -> Audio:
-    part = slice(start, stop)
-    return replace(
-        piece,
-        start_sample=piece.start_sample + start,
-        samples=piece.samples[part],
-        sigma=piece.sigma[part],
-        flags=piece.flags[part],
-    )
-
-
-def _behind(waiting: Audio, piece: Audio) -> Audio:
-    return replace(
-        waiting,
-        samples=np.concatenate([waiting.samples, piece.samples]),
-        sigma=np.concatenate([waiting.sigma, piece.sigma]),
-        flags=np.concatenate([waiting.flags, piece.flags]),
-    )
+                yield replace(part_of(waiting, 0, samples.size), samples=samples)
+            waiting = part_of(waiting, samples.size, None)
 
 
 def _silence(count: int, *, after: Audio) -> Audio:

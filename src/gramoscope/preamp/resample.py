@@ -32,7 +32,7 @@ class Resampler:
     Parameters
     ----------
     rotation : Rotation
-        How the record was meant to turn.
+        How the record was meant to turn; a `DriftingRotation` where its speed changed over time.
     rate_hz : float
         Of the sound.
     passband : float
@@ -111,7 +111,7 @@ class _Grid:
 
     @classmethod
     def of(cls, first: GrooveMotion, resampler: Resampler) -> _Grid:
-        fastest = float(resampler.rotation.speed_at_m_s(min(0.0, first.arc_start_m)))
+        fastest = resampler.rotation.fastest_m_s(min(0.0, first.arc_start_m))
         width = half_width(resampler.passband)
         reach = int(np.ceil(width * max(1.0, fastest / first.arc_step_m / resampler.rate_hz))) + 2
         late = int(np.ceil(max(0.0, first.arc_start_m / first.arc_step_m)))
@@ -139,7 +139,7 @@ class _Grid:
         rotation, rate_hz = self.resampler.rotation, self.resampler.rate_hz
         return (
             f"{direction} motion resampled from every {self.arc_step_m * 1e6:.4g} µm "
-            f"to {rate_hz:g} Hz at {rotation.rpm:g} rpm"
+            f"to {rate_hz:g} Hz at {rotation.in_words()}"
         )
 
 

@@ -22,7 +22,7 @@ from scipy import linalg
 
 from gramoscope.conventions import FloatArray
 from gramoscope.tonearm.linear_gaussian import Filtered, FilterState, Moves, Readings
-from gramoscope.tonearm.small_matrices import STATES, block_sandwich, block_vector, dot, times
+from gramoscope.tonearm.small_matrices import STATES, add_products, block_sandwich, block_vector, dot, times
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,72 +43,75 @@ class Smoothed:
 
 
 @numba.njit(cache=True, nogil=True)
-def _unobserve(h, innovation, spread, gain, nk, r, n):  # type: ignore[no-untyped-def]
+def _unobserve(h, j, innovation, spread, gain, nk, r, n):  # type: ignore[no-untyped-def]
     """Take one used reading into r and N; return its e and D."""
-    knk = times(n, gain, nk)
-    e = innovation / spread - dot(gain, r)
+    knk = times(n, gain, j, nk)
+    e = innovation / spread - dot(gain, j, r, 0, r.size)
     d = 1 / spread + knk
-    size = r.size
-    for i in range(size):
-        r[i] += h[i] * e
-        for j in range(size):
-            n[i, j] += h[i] * h[j] * d - h[i] * nk[j] - nk[i] * h[j]
+    for i in range(r.size):
+        r[i] += h[j, i] * e
+        # h hᵀ d − h (NK)ᵀ − (NK) hᵀ, in two products
+        nk[i] = 0.5 * h[j, i] * d - nk[i]
+    add_products(h, j, nk, 0, n)
+    add_products(nk, 0, h, j, n)
     return e, d
 
 
 @numba.njit(cache=True, nogil=True)
-def _far(h, value, variance, m, p, r, n, ph, nph):  # type: ignore[no-untyped-def]
+def _far(away, ph, j, expected, variance, r, n, nph):  # type: ignore[no-untyped-def]
     """How many standard deviations an unused reading lies from the smoothed state."""
-    before = times(p, h, ph)
-    spread = max(before - times(n, ph, nph), 0.0) + variance
-    return abs(value - dot(h, m) - dot(ph, r)) / np.sqrt(spread)
+    spread = max(expected - times(n, ph, j, nph), 0.0) + variance
+    return abs(away - dot(ph, j, r, 0, r.size)) / np.sqrt(spread)
 
 
 @numba.njit(cache=True, nogil=True)
-def _smooth(at, model, places, h, value, variance, gate_variance, used, nu, spread, gain, means, covs, want, mean, sigma, off):  # type: ignore  # fmt: skip
+def _smooth(a, at, model, places, h, value, variance, gate_variance, used, nu, spread, gain, expected, means, want, toward, mean, sigma, off):  # type: ignore  # fmt: skip  # noqa: E501
     size = means.shape[1]
-    r, r_before, n, n_before = np.zeros(size), np.zeros(size), np.zeros((size, size)), np.zeros((size, size))
-    half, one, two = np.empty((STATES, STATES)), np.empty(size), np.empty(size)
+    r, r_next, n, n_next = np.zeros(size), np.zeros(size), np.zeros((size, size)), np.zeros((size, size))
+    half, one = np.empty((STATES, STATES)), np.empty(size)
     j = places.size - 1
     for k in range(means.shape[0] - 1, -1, -1):
-        block_vector(at[model[k]], r, r_before)
-        block_sandwich(at[model[k]], n, half, n_before)
-        r[:], n[:] = r_before, n_before
+        r, r_next = r_next, r
+        n, n_next = n_next, n
+        block_vector(a, size * model[k], r_next, r)
+        block_sandwich(at, a, size * model[k], n_next, half, n)
         last = j
         while j >= 0 and places[j] == k:
             if used[j]:
-                e, d = _unobserve(h[j], nu[j], spread[j], gain[j], one, r, n)
+                e, d = _unobserve(h, j, nu[j], spread[j], gain, one, r, n)
                 off[j] = abs(e / d) / np.sqrt(1 / d + gate_variance[j] - variance[j])
             j -= 1
         for i in range(j + 1, last + 1):
             if not used[i]:
-                off[i] = _far(h[i], value[i], gate_variance[i], means[k], covs[k], r, n, one, two)
+                away = value[i] - dot(h, i, means, k, size)
+                off[i] = _far(away, gain, i, expected[i], gate_variance[i], r, n, one)
         for i in range(want.shape[0]):
-            before = times(covs[k], want[i], one)
-            mean[k, i] = dot(want[i], means[k]) + dot(one, r)
-            sigma[k, i] = np.sqrt(max(before - times(n, one, two), 0.0))
+            # row of `toward`
+            there = k * want.shape[0] + i
+            mean[k, i] = dot(want, i, means, k, size) + dot(toward, there, r, 0, size)
+            less = times(n, toward, there, one)
+            sigma[k, i] = np.sqrt(max(dot(want, i, toward, there, size) - less, 0.0))
 
 
-def backward(moves: Moves, readings: Readings, filtered: Filtered, *, wanted: FloatArray) -> Smoothed:
+def backward(moves: Moves, readings: Readings, filtered: Filtered) -> Smoothed:
     """Smooth what was filtered.
 
     Parameters
     ----------
     moves, readings, filtered
         What went into `forward`, and what came out.
-    wanted : float64 array, shape (wanted, block · n)
-        Rows: what is asked for, times the state.
 
     Returns
     -------
     Smoothed
+        Of what `forward` was told is wanted.
     """
-    shape = (moves.model.size, wanted.shape[0])
+    shape = filtered.toward.shape[:2]
     mean, sigma, distance = np.empty(shape), np.empty(shape), np.empty(readings.value.size)
     _smooth(
-        np.ascontiguousarray(moves.a.swapaxes(-1, -2)), moves.model, readings.bin, readings.h, readings.value,
-        readings.variance, readings.gate_variance, filtered.used, filtered.innovation, filtered.spread, filtered.gain,
-        filtered.mean, filtered.covariance, wanted, mean, sigma, distance,
+        *moves.stacked[:2], moves.model, readings.bin, readings.h, readings.value, readings.variance,
+        readings.gate_variance, filtered.used, filtered.innovation, filtered.spread, filtered.gain, filtered.expected,
+        filtered.mean, filtered.wanted, filtered.toward.reshape(-1, filtered.mean.shape[1]), mean, sigma, distance,
     )  # fmt: skip
     return Smoothed(mean, sigma, distance)
 

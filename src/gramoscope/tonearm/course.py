@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -37,7 +38,7 @@ class Course:
         """φ of the inner and of the outer wall."""
         return np.broadcast_to(np.asarray(self.wall_angle_rad, np.float64), 2)
 
-    @property
+    @cached_property
     def gains(self) -> FloatArray:
         """How far the inner and the outer wall move towards +l when the groove rises by one: ∓ cot φ."""
         return np.array([-1.0, 1.0]) / np.tan(self.wall_angles_rad)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+import numba
 import numpy as np
 
 from gramoscope.conventions import BoolArray, FloatArray, IntArray
@@ -133,16 +134,17 @@ def which(models: Sequence[GrooveModel], bins: IntArray) -> IntArray:
     return np.maximum(np.searchsorted(starts, bins, side="right") - 1, 0)
 
 
-def moves(models: Sequence[GrooveModel], bins: IntArray) -> Moves:
-    """Return how the state moves from each bin to the next."""
-    here = which(models, bins)
-    agitation = np.ones(bins.size)
-    for number in np.unique(here):
-        model = models[number]
-        mine = np.flatnonzero(
-            (here == number) & (bins >= model.from_bin) & (bins < model.from_bin + model.agitation.size)
-        )
-        agitation[mine] = model.agitation[bins[mine] - model.from_bin]
+def moves(models: Sequence[GrooveModel], first_bin: int, stop_bin: int) -> Moves:
+    """Return how the state moves from each bin, first … stop − 1, to the next."""
+    here = which(models, np.arange(first_bin, stop_bin))
+    agitation = np.ones(here.size)
+    limits = np.searchsorted(here, np.arange(len(models) + 1)) + first_bin
+    for model, begin, end in zip(models, limits[:-1], limits[1:], strict=True):
+        begin, end = max(begin, model.from_bin), min(end, model.from_bin + model.agitation.size)
+        if begin < end:
+            agitation[begin - first_bin : end - first_bin] = model.agitation[
+                begin - model.from_bin : end - model.from_bin
+            ]
     return Moves(np.stack([m.a for m in models]), np.stack([m.q for m in models]), here, agitation)
 
 
@@ -169,21 +171,18 @@ class Followed:
     smoothed : Smoothed
         Slopes of both directions, times the step.
     accepted : bool array, shape (reading,)
-    first, last : Filtered
-        The passes.
+    state : PassState
+        Where to go on.
     """
 
     smoothed: Smoothed
     accepted: BoolArray
-    first: Filtered
-    last: Filtered
-
-    def state(self, first_bin: int, bin_: int) -> PassState:
-        """Return where to go on at a bin; `first_bin` is where the passes began."""
-        return PassState(bin_, self.first.state(bin_ - first_bin), self.last.state(bin_ - first_bin))
+    state: PassState
 
 
-def robustly(steps: Moves, readings: Readings, trusted: BoolArray, begin: PassState, *, gate: float) -> Followed:
+def robustly(
+    steps: Moves, readings: Readings, trusted: BoolArray, begin: PassState, *, gate: float, resume_bin: int
+) -> Followed:
     """Smooth the groove by readings some of which are wild.
 
     Parameters
@@ -195,23 +194,35 @@ def robustly(steps: Moves, readings: Readings, trusted: BoolArray, begin: PassSt
     begin : PassState
     gate : float
         Standard deviations.
+    resume_bin : int
+        Where to go on later, counted as `begin.bin` is.
 
     Returns
     -------
     Followed
     """
+    resume = resume_bin - begin.bin
     rule = Gate(gate, PATIENCE, ANYWHERE_M, DOUBT)
-    first = forward(steps, readings, begin.first, gate=rule, allowed=trusted)
-    accepted = backward(steps, readings, first, wanted=SLOPES[:0]).distance <= gate
+    first = forward(steps, readings, begin.first, gate=rule, allowed=trusted, resume=resume)
+    accepted = backward(steps, readings, first).distance <= gate
     lost, missed = _where_it_was_lost(first, readings)
     accepted |= missed & trusted
     for _ in range(ROUNDS):
-        last = forward(steps, readings, begin.last, gate=Gate(anywhere=ANYWHERE_M), allowed=accepted, lost=lost)
-        smoothed = backward(steps, readings, last, wanted=SLOPES)
+        last = forward(
+            steps,
+            readings,
+            begin.last,
+            gate=Gate(anywhere=ANYWHERE_M),
+            allowed=accepted,
+            lost=lost,
+            wanted=SLOPES,
+            resume=resume,
+        )
+        smoothed = backward(steps, readings, last)
         used, accepted = accepted, smoothed.distance <= gate
         if np.array_equal(used, accepted):
             break
-    return Followed(smoothed, used, first, last)
+    return Followed(smoothed, used, PassState(resume_bin, first.resume, last.resume))
 
 
 def _where_it_was_lost(first: Filtered, readings: Readings) -> tuple[BoolArray, BoolArray]:
@@ -248,7 +259,7 @@ def agitation(model: GrooveModel, readings: Readings, trusted: BoolArray) -> Flo
     factor = np.ones(bins)
     for _ in range(AGITATION_ROUNDS):
         restless = replace(model, from_bin=0, agitation=factor)
-        found = forward(moves([restless], np.arange(bins)), readings, blank(model.covariance), allowed=trusted)
+        found = forward(moves([restless], 0, bins), readings, blank(model.covariance), allowed=trusted)
         excess = _excess(*_surprise(found, readings, trusted), bins)
         if not (excess > 1).any():
             break
@@ -264,23 +275,24 @@ def _surprise(found: Filtered, readings: Readings, trusted: BoolArray) -> tuple[
     one = np.flatnonzero((readings.bin[1:] == readings.bin[:-1]) & trusted[1:] & trusted[:-1])
     h, bins = readings.h, readings.bin
     away = readings.value - np.einsum("ij,ij->i", h, found.mean[bins])
-    spread = np.einsum("ij,ijk,ik->i", h, found.covariance[bins], h) + readings.variance
+    spread = found.expected + readings.variance
     apart = np.minimum((away[one] - away[one + 1]) ** 2, (away[one] + away[one + 1]) ** 2)
     agree = apart < AGREEMENT * (readings.variance[one] + readings.variance[one + 1])
     share = away**2 / spread
     return bins[one], np.where(agree, np.minimum(share[one], share[one + 1]), 0.0)
 
 
-def _excess(bins: IntArray, surprise: FloatArray, size: int) -> FloatArray:
+@numba.njit(cache=True, nogil=True)
+def _excess(bins, surprise, size):  # type: ignore[no-untyped-def]
     """The median of the surprise about each bin, over that of a normal number, if it is large; else 1."""
     excess = np.ones(size)
     if np.count_nonzero(surprise > AGITATED * NORMAL_MEDIAN) < AGITATION_BINS // 4:
         return excess
     for first in range(0, size, AGITATION_BINS // 2):
-        near = surprise[(bins >= first) & (bins < first + AGITATION_BINS)]
+        near = surprise[np.searchsorted(bins, first) : np.searchsorted(bins, first + AGITATION_BINS)]
         if near.size >= AGITATION_BINS // 2:
-            ratio = float(np.median(near)) / NORMAL_MEDIAN
+            ratio = np.median(near) / NORMAL_MEDIAN
             if ratio > AGITATED:
-                here = excess[first : first + AGITATION_BINS]
-                np.maximum(here, ratio, out=here)
+                for k in range(first, min(first + AGITATION_BINS, size)):
+                    excess[k] = max(excess[k], ratio)
     return excess

@@ -17,23 +17,21 @@ order 7/2, and the capture chooses.
 The state is (a, u, …, u‴, v, v′, v″), each derivative times the power of the grid's step Δ that makes it a length: it means
 the same whatever the prior is, and its parts are of like size. Over one step it moves by A = exp(F) with noise of covariance
 Q = ∫₀¹ exp(Ft) W exp(Ft)ᵀ dt: Taylor's series over a short step (dQ/dt = FQ + QFᵀ + W), then doubled by
-Q ← Q + A Q Aᵀ, A ← A² as often as needed. Doubled until A is nothing, the same gives the covariance at rest.
+Q ← Q + A Q Aᵀ, A ← A² as often as needed.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import factorial
 
 import numba
 import numpy as np
 
 from gramoscope.conventions import FloatArray
-from gramoscope.tonearm.small_matrices import STATES
+from gramoscope.tonearm.vector_rows import STATES, multiply, transpose
 
-CORNER_POLES, CUTOFF_POLES, WIDE_POLES = 2, 2, 3
-ORDER = CORNER_POLES + CUTOFF_POLES
-"""Poles of u."""
+ORDER, WIDE_POLES = 4, 3
+"""Poles of u, two at λ and two at μ, and of v."""
 BODY, WIDE = 1, 1 + ORDER
 """Where u and v (times Δ) stand in the state."""
 assert STATES == 1 + ORDER + WIDE_POLES
@@ -44,8 +42,6 @@ BEND_M = 50e-6
 """ℓ, over which a bend is measured."""
 TERMS = 32
 """Of the series over a short step: Q of the place begins with the eleventh."""
-NOTHING = 1e-20
-"""What is smaller has been forgotten."""
 
 
 @dataclass(frozen=True)
@@ -87,57 +83,79 @@ class GroovePrior:
 
     def steps(self, step_m: float) -> tuple[FloatArray, FloatArray]:
         """Return A and Q for one step of the grid, shape (8, 8) each, the state in metres and var u = 1."""
-        drift, noise, _ = self._process(step_m)
-        a, q = one_step(drift, noise)
+        a, q = _steps(self._shape, step_m)
         return a, q
 
     def at_rest(self, step_m: float) -> FloatArray:
         """Return the covariance of all but the place before anything was seen, shape (7, 7), for var u = 1."""
-        return self._process(step_m)[2]
+        resting: FloatArray = _process(self._shape, step_m)[2]
+        return resting
 
     def bend(self, step_m: float) -> float:
         """Return the standard deviation of (a(s + ℓ) − 2a(s) + a(s − ℓ))/ℓ, ℓ = `BEND_M`, for var u = 1."""
-        drift, noise, at_rest = self._process(step_m)
-        lag = BEND_M / step_m
-        a, q = one_step(lag * drift, lag * noise)
-        later = a[0] - 2 * np.eye(STATES)[0]
-        now = (later @ a)[1:]
-        variance = now @ at_rest @ now + later @ q @ later + q[0, 0]
-        return float(np.sqrt(variance) / BEND_M)
+        return float(np.sqrt(_bend_variance(self._shape, step_m)) / BEND_M)
 
-    def _process(self, step_m: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """F, density of the noise, and covariance at rest of (u, …, u‴, v, v′, v″), in steps and for var u = 1."""
-        drift, noise, resting = (np.zeros((size, size)) for size in (STATES, STATES, STATES - 1))
-        drift[0] = SLOPE
-        corner, cutoff, width = (k * step_m for k in (self.corner_per_m, self.cutoff_per_m, self.width_per_m))
-        parts = (
-            (BODY, [corner] * CORNER_POLES + [cutoff] * CUTOFF_POLES, 1.0),
-            (WIDE, [width] * WIDE_POLES, self.wide_share**2),
-        )
-        for first, poles, power in parts:
-            moving, density, rest = _coloured(np.array(poles))
-            part, without_place = slice(first, first + len(poles)), slice(first - 1, first - 1 + len(poles))
-            drift[part, part], resting[without_place, without_place] = moving, power * rest
-            noise[part.stop - 1, part.stop - 1] = power * density
-        return drift, step_m**2 * noise, step_m**2 * resting
+    @property
+    def _shape(self) -> tuple[float, float, float, float]:
+        return self.corner_per_m, self.cutoff_per_m, self.width_per_m, self.wide_share
 
 
-def _coloured(poles: FloatArray) -> tuple[FloatArray, float, FloatArray]:
-    """F, density of the noise and covariance at rest of (u, u′, …), white noise behind so many poles, for var u = 1."""
-    # in units in which the poles lie about one, so that nothing is lost between the first and the last
-    order, unit = poles.size, float(np.exp(np.log(poles).mean()))
-    moving = np.diag(np.ones(order - 1), 1)
-    moving[-1] = -np.poly(-poles / unit)[:0:-1]
-    last = np.zeros((order, order))
-    last[-1, -1] = 1.0
-    resting = at_rest(moving, last)
-    scale = unit ** np.arange(order)
-    power = 1 / resting[0, 0]
-    return (
-        unit * moving * np.outer(scale, 1 / scale),
-        float(power * unit * scale[-1] ** 2),
-        power * resting * np.outer(scale, scale),
-    )
+@numba.njit(cache=True, nogil=True)
+def _process(shape, step_m):  # type: ignore[no-untyped-def]
+    """F, density of the noise, and covariance at rest of (u, …, u‴, v, v′, v″), in steps and for var u = 1.
+
+    With x the derivatives of a stationary process, E[x⁽ⁱ⁾x⁽ʲ⁾] = ± r_{(i+j)/2} for even i + j, else 0. Multiplied with each
+    of them its equation x⁗ + c₃x‴ + … = w gives what follows.
+    """
+    one, other, width = shape[0] * step_m, shape[1] * step_m, shape[2] * step_m
+    product, both = one * other, one + other
+    drift, noise, resting = np.zeros((STATES, STATES)), np.zeros((STATES, STATES)), np.zeros((STATES - 1, STATES - 1))
+    drift[0] = SLOPE
+    _companion(drift, BODY, (product**2, 2 * product * both, both**2 + 2 * product, 2 * both))
+    spread = both**2 + product
+    _stationary(resting, BODY - 1, (1.0, product**2 / spread, product**3 / spread, product**3), 1.0)
+    noise[WIDE - 1, WIDE - 1] = 4 * (product * both) ** 3 / spread
+    _companion(drift, WIDE, (width**3, 3 * width**2, 3 * width))
+    _stationary(resting, WIDE - 1, (1.0, width**2 / 3, width**4), shape[3] ** 2)
+    noise[-1, -1] = shape[3] ** 2 * 16 / 3 * width**5
+    return drift, step_m**2 * noise, step_m**2 * resting
+
+
+@numba.njit(cache=True, nogil=True)
+def _companion(drift, first, coefficients):  # type: ignore[no-untyped-def]
+    """Write F of a process whose highest derivative follows from the others."""
+    last = first + len(coefficients) - 1
+    for i in range(len(coefficients)):
+        if first + i < last:
+            drift[first + i, first + i + 1] = 1.0
+        drift[last, first + i] = -coefficients[i]
+
+
+@numba.njit(cache=True, nogil=True)
+def _stationary(resting, first, powers, scale):  # type: ignore[no-untyped-def]
+    """Write the covariance at rest of a process and its derivatives, whose variances are given."""
+    for i in range(len(powers)):
+        for j in range(i % 2, len(powers), 2):
+            sign = 1.0 if (i - j) % 4 == 0 else -1.0
+            resting[first + i, first + j] = scale * sign * powers[(i + j) // 2]
+
+
+@numba.njit(cache=True, nogil=True)
+def _steps(shape, step_m):  # type: ignore[no-untyped-def]
+    drift, noise, _ = _process(shape, step_m)
+    return _one_step(drift, noise)
+
+
+@numba.njit(cache=True, nogil=True)
+def _bend_variance(shape, step_m):  # type: ignore[no-untyped-def]
+    """Variance of a(s + ℓ) − 2a(s) + a(s − ℓ)."""
+    drift, noise, resting = _process(shape, step_m)
+    lag = BEND_M / step_m
+    a, q = _one_step(lag * drift, lag * noise)
+    later = a[0].copy()
+    later[0] -= 2.0
+    now = (later @ a)[1:]
+    return now @ resting @ now + later @ q @ later + q[0, 0]
 
 
 def start(at_rest: FloatArray, sigma: float, *, place_sigma_m: float) -> FloatArray:
@@ -149,67 +167,44 @@ def start(at_rest: FloatArray, sigma: float, *, place_sigma_m: float) -> FloatAr
 
 
 @numba.njit(cache=True, nogil=True)
-def _product(a, b, out):  # type: ignore[no-untyped-def]
-    size = a.shape[0]
-    for i in range(size):
-        for j in range(size):
-            total = 0.0
-            for k in range(size):
-                total += a[i, k] * b[k, j]
-            out[i, j] = total
-
-
-@numba.njit(cache=True, nogil=True)
 def _series(f, noise, a, q):  # type: ignore[no-untyped-def]
     """Write A and Q over a step that is short enough for the series to converge at once."""
-    size = f.shape[0]
-    power, change, one = np.eye(size), noise.copy(), np.empty((size, size))
+    power, change, one, two = np.eye(STATES), noise.copy(), np.empty_like(f), np.empty_like(f)
     a[:] = power
     q[:] = change
     for n in range(1, TERMS):
-        _product(f, power, one)
-        power[:] = one / n
-        a += power
-        _product(f, change, one)
-        change[:] = (one + one.T) / (n + 1)
-        q += change
+        multiply(f, 0, 0, power, 0, 0, one, 0, 0)
+        multiply(f, 0, 0, change, 0, 0, two, 0, 0)
+        for i in range(STATES):
+            for j in range(STATES):
+                power[i, j] = one[i, j] / n
+                a[i, j] += power[i, j]
+                change[i, j] = (two[i, j] + two[j, i]) / (n + 1)
+                q[i, j] += change[i, j]
 
 
 @numba.njit(cache=True, nogil=True)
-def _double(a, q, one, two):  # type: ignore[no-untyped-def]
-    _product(a, q, one)
-    _product(one, a.T, two)
-    q += two
-    _product(a, a, one)
-    a[:] = one
-
-
-@numba.njit(cache=True, nogil=True)
-def one_step(f, noise):  # type: ignore[no-untyped-def]
+def _one_step(f, noise):  # type: ignore[no-untyped-def]
     """Return exp(F) and ∫₀¹ exp(Ft) W exp(Ft)ᵀ dt, W being the density of the noise."""
     largest = 0.0
-    for i in range(f.shape[0]):
+    for i in range(STATES):
         largest = max(largest, np.sum(np.abs(f[i])))
     halvings = max(0, int(np.ceil(np.log2(largest))))
     share = 0.5**halvings
     a, q, one, two = np.empty_like(f), np.empty_like(f), np.empty_like(f), np.empty_like(f)
     _series(f * share, noise * share, a, q)
     for _ in range(halvings):
-        _double(a, q, one, two)
+        multiply(a, 0, 0, q, 0, 0, one, 0, 0)
+        transpose(a, 0, 0, two, 0, 0)
+        multiply(one, 0, 0, two, 0, 0, one, 0, 0)
+        q += one
+        multiply(a, 0, 0, a, 0, 0, two, 0, 0)
+        a[:] = two
     return a, q
 
 
 @numba.njit(cache=True, nogil=True)
-def at_rest(f, noise):  # type: ignore[no-untyped-def]
-    """Return ∫₀^∞ exp(Ft) W exp(Ft)ᵀ dt of a stable F: the solution of F P + P Fᵀ + W = 0."""
-    a, q = one_step(f, noise)
-    one, two = np.empty_like(f), np.empty_like(f)
-    while np.max(np.abs(a)) > NOTHING:
-        _double(a, q, one, two)
-    return q
-
-
-def taylor(fraction: FloatArray) -> FloatArray:
+def taylor(fraction):  # type: ignore[no-untyped-def]
     """Return the rows that take the state to the place a fraction of a step away.
 
     Parameters
@@ -222,5 +217,12 @@ def taylor(fraction: FloatArray) -> FloatArray:
     float64 array, shape (reading, 8)
         Of u four terms of the series count, of v three.
     """
-    powers = [fraction**i / factorial(i) for i in range(WIDE + 1)]
-    return np.stack([*powers[:WIDE], *powers[1 : 1 + WIDE_POLES]], axis=-1)
+    out = np.zeros((fraction.size, STATES))
+    for j in range(fraction.size):
+        power = 1.0
+        for i in range(WIDE):
+            out[j, i] = power
+            if 0 < i <= WIDE_POLES:
+                out[j, ORDER + i] = power
+            power *= fraction[j] / (i + 1)
+    return out

@@ -8,18 +8,17 @@ learned but given (`tonearm.level`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy import optimize
 
-from gramoscope.conventions import FloatArray
-from gramoscope.tonearm.groove_prior import GroovePrior, start, taylor
+from gramoscope.conventions import FloatArray, IntArray
+from gramoscope.tonearm.groove_prior import GroovePrior
 from gramoscope.tonearm.level import LEAST_SAMPLES, OneDirection, slope_power
-from gramoscope.tonearm.linear_gaussian import Readings
-from gramoscope.tonearm.steady_likelihood import steady_log_likelihood
+from gramoscope.tonearm.steady_likelihood import PlaceReadings, one_after_the_other, steady_log_likelihood
 
 GATE = 4.0
 """Samples further than this many standard errors from their prediction count as if they lay right there."""
@@ -73,33 +72,38 @@ class PriorLimits:
 
 
 @dataclass(frozen=True, eq=False)
-class Lesson:
-    """What one stretch teaches of one direction: its readings, how loud it is, and the mean square of its slopes."""
+class Lessons:
+    """What some stretches teach of one direction: readings, how loud each is, and the mean square of its slopes."""
 
-    readings: Readings
-    level: float
-    slope_power: float
+    readings: PlaceReadings
+    level: FloatArray
+    slope_power: FloatArray
 
 
-def lesson(one: OneDirection, level: float, step_m: float) -> Lesson | None:
-    """Return what a stretch teaches; None when it was hardly seen."""
-    known = np.flatnonzero(np.isfinite(one.place_m))
-    if known.size < LEAST_SAMPLES:
+def lessons(stretches: Iterable[tuple[OneDirection, float]], step_m: float) -> Lessons | None:
+    """Return what stretches of given levels teach; None when all were hardly seen."""
+    seen = [(one, level) for one, level in stretches if one.known >= LEAST_SAMPLES]
+    if not seen:
         return None
-    place, variance = one.place_m[known], one.variance[known]
-    h = np.repeat(taylor(np.zeros(1)), known.size, axis=0)
-    readings = Readings(known - known[0], np.zeros_like(known), h, place - place[0], variance, variance)
-    return Lesson(readings, level, slope_power(one, step_m))
+    power = [slope_power(one, step_m) for one, _ in seen]
+    readings = one_after_the_other([_counted_from_the_first(one) for one, _ in seen])
+    return Lessons(readings, np.array([level for _, level in seen]), np.array(power))
+
+
+def _counted_from_the_first(one: OneDirection) -> tuple[IntArray, FloatArray, FloatArray]:
+    known = np.flatnonzero(np.isfinite(one.place_m))
+    place = one.place_m[known]
+    return known - known[0], place - place[0], one.variance[known]
 
 
 def learn(
-    lessons: Sequence[Lesson], step_m: float, limits: PriorLimits, *, before: GroovePrior | None = None
+    given: Lessons | None, step_m: float, limits: PriorLimits, *, before: GroovePrior | None = None
 ) -> GroovePrior:
     """Return the prior under which the stretches are most likely.
 
     Parameters
     ----------
-    lessons : sequence of Lesson
+    given : Lessons or None
     step_m : float
         From one sample to the next.
     limits : PriorLimits
@@ -112,7 +116,7 @@ def learn(
         By bounded Nelder–Mead over the logarithms of all five; `before`, or the middle of the limits, when there
         are no lessons.
     """
-    if not lessons:
+    if given is None:
         return before or limits.middle
     known, first, step = (
         _logarithms(before or limits.middle),
@@ -123,8 +127,12 @@ def learn(
     def cost(logarithms: FloatArray) -> float:
         change = (logarithms - known) / (DRIFT if before else UNHEARD)
         prior = _prior(logarithms, limits)
-        disbelief = 0.5 * float(change @ change) + 0.5 * _louder(lessons, step_m, prior) ** 2
-        return disbelief - _log_likelihood(lessons, step_m, prior)
+        # the slopes of each stretch, of their bodies
+        sigma = np.maximum(prior.share * given.level, prior.floor) / prior.bend(step_m)
+        disbelief = 0.5 * float(change @ change) + 0.5 * _louder(given, sigma) ** 2
+        return disbelief - steady_log_likelihood(
+            prior.steps(step_m), prior.at_rest(step_m), given.readings, sigma, place_sigma_m=ANYWHERE_M, gate=GATE
+        )
 
     # what was learned in silence can be so far off that nothing leads away from it
     if before and cost(known) <= cost(first):
@@ -132,18 +140,17 @@ def learn(
     return _prior(_least(cost, first, step, limits.logarithms, 100 if before else 250), limits)
 
 
-def _louder(lessons: Sequence[Lesson], step_m: float, prior: GroovePrior) -> float:
+def _louder(given: Lessons, sigma: FloatArray) -> float:
     """How many standard errors louder the prior believes the groove to be than its slopes are.
 
     The likelihood knows the spectrum best where it meets the noise; extrapolated to the bass from there, it would fill gaps
     with thunder.
     """
-    power = np.array([one.slope_power for one in lessons])
-    known = np.isfinite(power)
-    believed = np.array([prior.bends(one.level) for one in lessons]) / prior.bend(step_m)
-    if not known.any() or np.mean(power[known]) <= 0:
+    known = np.isfinite(given.slope_power)
+    power = float(np.mean(given.slope_power[known])) if known.any() else 0.0
+    if power <= 0:
         return 0.0
-    return float(0.5 * np.log(np.mean(believed[known] ** 2) / np.mean(power[known])) / SLOPE_SIGMA)
+    return float(0.5 * np.log(np.mean(sigma[known] ** 2) / power) / SLOPE_SIGMA)
 
 
 def _least(
@@ -156,19 +163,6 @@ def _least(
     options: Any = {"xatol": 0.1, "fatol": 0.3, "maxfev": looks, "initial_simplex": np.clip(simplex, *bounds.T)}
     found = optimize.minimize(cost, inside, method="Nelder-Mead", bounds=optimize.Bounds(*bounds.T), options=options)
     return np.asarray(found.x)
-
-
-def _log_likelihood(lessons: Sequence[Lesson], step_m: float, prior: GroovePrior) -> float:
-    a, q = prior.steps(step_m)
-    at_rest, bend = prior.at_rest(step_m), prior.bend(step_m)
-    total = 0.0
-    for one in lessons:
-        sigma, read = prior.bends(one.level) / bend, one.readings
-        covariance = start(at_rest, sigma, place_sigma_m=ANYWHERE_M)
-        total += steady_log_likelihood(
-            a, sigma**2 * q, covariance, read.bin, read.value, read.variance, read.h[0], gate=GATE
-        )
-    return total
 
 
 def _logarithms(prior: GroovePrior) -> FloatArray:

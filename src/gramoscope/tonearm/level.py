@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import chain, repeat
 
+import numba
 import numpy as np
 
 from gramoscope.conventions import INNER, OUTER, FloatArray
@@ -94,14 +95,21 @@ def one_direction(walls: Walls, direction: Direction, gains: FloatArray, *, list
 def bend_power(one: OneDirection, step_m: float) -> float:
     """Return the variance of the bends of one stretch; below zero by chance when silent, NaN when hardly seen."""
     lag = max(int(np.rint(BEND_M / step_m)), 1)
-    place, variance = one.place_m, one.variance
-    bends = place[2 * lag :] - 2 * place[lag:-lag] + place[: -2 * lag]
-    noise = variance[2 * lag :] + 4 * variance[lag:-lag] + variance[: -2 * lag]
-    seen = np.isfinite(bends) & np.isfinite(noise)
-    if np.count_nonzero(seen) < LEAST_SAMPLES:
-        return float("nan")
-    power = (NORMAL * np.median(np.abs(bends[seen]))) ** 2 - np.median(noise[seen])
-    return float(power / (lag * step_m) ** 2)
+    return float(_bend_power(one.place_m, one.variance, lag) / (lag * step_m) ** 2)
+
+
+@numba.njit(cache=True, nogil=True)
+def _bend_power(place_m, variance, lag):  # type: ignore[no-untyped-def]
+    bends, noise = np.empty(place_m.size), np.empty(place_m.size)
+    seen = 0
+    for i in range(lag, place_m.size - lag):
+        bends[seen] = abs(place_m[i + lag] - 2 * place_m[i] + place_m[i - lag])
+        noise[seen] = variance[i + lag] + 4 * variance[i] + variance[i - lag]
+        if np.isfinite(bends[seen]) and np.isfinite(noise[seen]):
+            seen += 1
+    if seen < LEAST_SAMPLES:
+        return np.nan
+    return (NORMAL * np.median(bends[:seen])) ** 2 - np.median(noise[:seen])
 
 
 def slope_power(one: OneDirection, step_m: float) -> float:

@@ -16,7 +16,7 @@ import numba
 import numpy as np
 
 from gramoscope.conventions import BoolArray, FloatArray, IntArray
-from gramoscope.tonearm.small_matrices import STATES, block_sandwich, block_vector, dot, times
+from gramoscope.tonearm.small_matrices import STATES, add_products, block_sandwich, block_vector, dot, times
 
 SOURCES = 2
 FORGIVENESS = 8
@@ -42,6 +42,12 @@ class Moves:
     q: FloatArray
     model: IntArray
     agitation: FloatArray
+
+    @property
+    def stacked(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """All blocks of A, Aᵀ and Q one below the other, shape (model · block · n, n)."""
+        a, at, q = (blocks.reshape(-1, STATES) for blocks in (self.a, self.a.swapaxes(-1, -2), self.q))
+        return np.ascontiguousarray(a), np.ascontiguousarray(at), np.ascontiguousarray(q)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,8 +128,13 @@ class Filtered:
 
     Attributes
     ----------
-    mean, covariance : float64 arrays, shapes (bin, block · n), (bin, block · n, block · n)
+    mean : float64 array, shape (bin, block · n)
         Predicted at each bin, before its readings.
+    wanted : float64 array, shape (wanted, block · n)
+        Rows w: what the smoother will be asked for, times the state.
+    toward : float64 array, shape (bin, wanted, block · n)
+        Pw, P being the covariance before the readings of a bin: all of it that the smoother needs. Whole covariances would not
+        fit into the processor's cache.
     missed, since : int64 arrays, shape (bin, SOURCES)
         See `FilterState`; where the place was lost, as they were before they were set to zero.
     lost : bool array, shape (bin,)
@@ -132,13 +143,18 @@ class Filtered:
     innovation, spread : float64 arrays, shape (reading,)
         ν and S.
     gain : float64 array, shape (reading, block · n)
-        K.
+        K of a used reading; Ph of another, P as above.
+    expected : float64 array, shape (reading,)
+        hᵀPh, the same P: how far off a reading without errors may be.
     log_likelihood : float
         Rejected readings count as if they lay at the gate: how far off they are teaches nothing.
+    resume : FilterState
+        Where to go on, at the bin that was asked for.
     """
 
     mean: FloatArray
-    covariance: FloatArray
+    wanted: FloatArray
+    toward: FloatArray
     missed: IntArray
     since: IntArray
     lost: BoolArray
@@ -146,35 +162,30 @@ class Filtered:
     innovation: FloatArray
     spread: FloatArray
     gain: FloatArray
+    expected: FloatArray
     log_likelihood: float
-
-    def state(self, bin_: int) -> FilterState:
-        """Return where to go on at a bin."""
-        kept = not self.lost[bin_]
-        return FilterState(self.mean[bin_], self.covariance[bin_], kept * self.missed[bin_], kept * self.since[bin_])
+    resume: FilterState
 
 
 @numba.njit(cache=True, nogil=True)
-def _move(a, q, agitation, m, p, half, m_out, p_out):  # type: ignore[no-untyped-def]
-    block_vector(a, m, m_out)
-    block_sandwich(a, p, half, p_out)
-    for b in range(a.shape[0]):
-        for i in range(STATES):
+def _move(a, at, q, first, agitation, m, p, half, m_out, p_out):  # type: ignore[no-untyped-def]
+    block_vector(at, first, m, m_out)
+    block_sandwich(a, at, first, p, half, p_out)
+    for b in range(0, m.size, STATES):
+        for i in range(b, b + STATES):
             for j in range(STATES):
-                p_out[b * STATES + i, b * STATES + j] += agitation * q[b, i, j]
+                p_out[i, b + j] += agitation * q[first + i, j]
 
 
 @numba.njit(cache=True, nogil=True)
-def _observe(innovation, spread, gain, m, p):  # type: ignore[no-untyped-def]
-    """Update mean and covariance in place, `gain` being ph on the way in and K on the way out."""
-    size = m.size
-    for i in range(size):
-        gain[i] /= spread
-        m[i] += gain[i] * innovation
-    for i in range(size):
-        w = gain[i] * spread
-        for j in range(size):
-            p[i, j] -= w * gain[j]
+def _observe(innovation, spread, ph, gain, j, m, p):  # type: ignore[no-untyped-def]
+    """Update mean and covariance in place and write K."""
+    for i in range(m.size):
+        gain[j, i] = -ph[i] / spread
+    add_products(ph, 0, gain, j, p)
+    for i in range(m.size):
+        gain[j, i] = -gain[j, i]
+        m[i] += gain[j, i] * innovation
 
 
 @numba.njit(cache=True, nogil=True)
@@ -192,35 +203,71 @@ def _judge(used, source, missed, since):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _filter(a, q, model, agitation, places, source, h, value, variance, gate_variance, rule, allowed, lost, m, p, missed, since, means, covs, misses, sinces, used, nu, spread, gain):  # type: ignore  # fmt: skip  # noqa: E501
+def _count(missed, since, patience, misses, sinces, k):  # type: ignore[no-untyped-def]
+    """Write down what was missed up to a bin and count it; return whether patience is at an end, and begin again then."""
+    lost = False
+    for i in range(SOURCES):
+        misses[k, i], sinces[k, i] = missed[i], since[i]
+        lost = lost or missed[i] >= patience
+    for i in range(SOURCES):
+        if lost:
+            missed[i], since[i] = 0, 0
+        elif missed[i] > 0:
+            since[i] += 1
+    return lost
+
+
+@numba.njit(cache=True, nogil=True)
+def _before_others(h, j, ph, first, used, spread, gain):  # type: ignore[no-untyped-def]
+    """Take ph back to before the readings from the first of a bin up to j; return by how much hᵀph grows."""
+    more = 0.0
+    for i in range(first, j):
+        if used[i]:
+            share = dot(gain, i, h, j, ph.size)
+            more += spread[i] * share**2
+            for n in range(ph.size):
+                ph[n] += spread[i] * share * gain[i, n]
+    return more
+
+
+@numba.njit(cache=True, nogil=True)
+def _filter(a, at, q, model, agitation, places, source, h, value, variance, gate_variance, rule, allowed, lost, m, p, missed, since, want, means, toward, misses, sinces, used, nu, spread, gain, expected, resume, m_resume, p_resume):  # type: ignore  # fmt: skip  # noqa: E501
     width, patience, anywhere, doubt = rule
-    half, m_next, p_next = np.empty((STATES, STATES)), np.empty_like(m), np.empty_like(p)
+    size = m.size
+    half, ph, m_next, p_next = np.empty((STATES, STATES)), np.empty_like(m), np.empty_like(m), np.empty_like(p)
     loglik = 0.0
     j = 0
     for k in range(means.shape[0]):
-        misses[k], sinces[k] = missed, since
-        if missed.max() >= patience:
-            lost[k] = True
-            missed[:] = 0
-            since[:] = 0
+        lost[k] |= _count(missed, since, patience, misses, sinces, k)
         if lost[k]:
             _lose(p, anywhere, doubt)
-        means[k], covs[k] = m, p
-        since += missed > 0
+        for i in range(size):
+            means[k, i] = m[i]
+        for i in range(want.shape[0]):
+            times(p, want, i, ph)
+            for n in range(size):
+                toward[k, i, n] = ph[n]
+        if k == resume:
+            m_resume[:], p_resume[:] = m, p
+        first = j
         while j < places.size and places[j] == k:
+            seen = times(p, h, j, ph)
+            nu[j], spread[j] = value[j] - dot(h, j, m, 0, size), seen + variance[j]
             if allowed[j]:
-                seen = times(p, h[j], gain[j])
-                nu[j] = value[j] - dot(h[j], m)
-                spread[j] = seen + variance[j]
                 used[j] = nu[j] ** 2 <= width**2 * (seen + gate_variance[j])
                 distance = nu[j] ** 2 / spread[j] if used[j] else width**2
                 loglik -= 0.5 * (LOG_2PI + np.log(spread[j]) + distance)
                 _judge(used[j], source[j], missed, since)
             if used[j]:
-                _observe(nu[j], spread[j], gain[j], m, p)
+                _observe(nu[j], spread[j], ph, gain, j, m, p)
+            expected[j] = seen + _before_others(h, j, ph, first, used, spread, gain)
+            if not used[j]:
+                for i in range(size):
+                    gain[j, i] = ph[i]
             j += 1
-        _move(a[model[k]], q[model[k]], agitation[k], m, p, half, m_next, p_next)
-        m[:], p[:] = m_next, p_next
+        _move(a, at, q, size * model[k], agitation[k], m, p, half, m_next, p_next)
+        m, m_next = m_next, m
+        p, p_next = p_next, p
     return loglik
 
 
@@ -232,6 +279,8 @@ def forward(
     gate: Gate | None = None,
     allowed: BoolArray | None = None,
     lost: BoolArray | None = None,
+    wanted: FloatArray | None = None,
+    resume: int = 0,
 ) -> Filtered:
     """Run the Kalman filter over a grid.
 
@@ -247,22 +296,31 @@ def forward(
         Readings that may be used at all; all of them if left out.
     lost : bool array, shape (bin,), optional
         Where the place is known to have been lost.
+    wanted : float64 array, shape (wanted, block · n), optional
+        What `backward` shall tell.
+    resume : int
+        The bin at which to go on later.
 
     Returns
     -------
     Filtered
     """
     bins, size, n = moves.model.size, begin.mean.size, readings.value.size
-    means, covs = np.empty((bins, size)), np.empty((bins, size, size))
+    want = np.zeros((0, size)) if wanted is None else wanted
+    means, toward = np.empty((bins, size)), np.empty((bins, want.shape[0], size))
     misses, sinces = np.empty((bins, SOURCES), np.int64), np.empty((bins, SOURCES), np.int64)
-    used, nu, spread, gain = np.zeros(n, np.bool_), np.empty(n), np.empty(n), np.empty((n, size))
+    used, nu, spread, expected, gain = np.zeros(n, np.bool_), np.empty(n), np.empty(n), np.empty(n), np.empty((n, size))
     may = np.ones(n, np.bool_) if allowed is None else allowed
     lost = np.zeros(bins, np.bool_) if lost is None else lost.copy()
     rule = gate or Gate()
+    m_resume, p_resume = np.empty(size), np.empty((size, size))
     loglik = _filter(
-        moves.a, moves.q, moves.model, moves.agitation, readings.bin, readings.source, readings.h, readings.value,
-        readings.variance, readings.gate_variance, (rule.width, rule.patience, rule.anywhere, rule.doubt), may, lost,
-        begin.mean.copy(), begin.covariance.copy(), begin.missed.copy(), begin.since.copy(), means, covs, misses,
-        sinces, used, nu, spread, gain,
+        *moves.stacked, moves.model, moves.agitation, readings.bin, readings.source, readings.h,
+        readings.value, readings.variance, readings.gate_variance,
+        (rule.width, rule.patience, rule.anywhere, rule.doubt), may, lost,
+        begin.mean.copy(), begin.covariance.copy(), begin.missed.copy(), begin.since.copy(), want, means, toward,
+        misses, sinces, used, nu, spread, gain, expected, resume, m_resume, p_resume,
     )  # fmt: skip
-    return Filtered(means, covs, misses, sinces, lost, used, nu, spread, gain, float(loglik))
+    kept = not lost[resume]
+    later = FilterState(m_resume, p_resume, kept * misses[resume], kept * sinces[resume])
+    return Filtered(means, want, toward, misses, sinces, lost, used, nu, spread, gain, expected, float(loglik), later)

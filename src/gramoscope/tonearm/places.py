@@ -25,8 +25,8 @@ from gramoscope.tonearm.course import Course
 from gramoscope.tonearm.error_spectrum import places_error
 from gramoscope.tonearm.grid_flags import OUTLIER, grid_flags
 from gramoscope.tonearm.groove_model import GrooveModel, PassState, beginning, moves, robustly, which
-from gramoscope.tonearm.place_samples import PlaceSamples, joined, samples_of
-from gramoscope.tonearm.stretches import Stretch, counted_from_the_start, handed_over, stretch_of
+from gramoscope.tonearm.place_samples import PlaceSamples, joined
+from gramoscope.tonearm.stretches import counted_from_the_start, handed_over, stretch_of
 from gramoscope.tonearm.teacher import DIRECTIONS, Teacher, Teaching
 
 UNOBSERVABLE = 0.95
@@ -127,7 +127,7 @@ class _PlaceFollower:
     course: Course
     step_m: float
 
-    def blocks(self, stretches: Iterator[tuple[Stretch, GrooveModel]]) -> Iterator[GrooveMotion]:
+    def blocks(self, stretches: Iterator[tuple[PlaceSamples, GrooveModel]]) -> Iterator[GrooveMotion]:
         """Answer bin after bin, some way behind the newest stretch."""
         pieces, models, done, last = list[PlaceSamples](), list[GrooveModel](), 0, 0
         state: PassState | None = None
@@ -135,7 +135,7 @@ class _PlaceFollower:
         while current is not None:
             taken = 0
             while current is not None and taken < self.smoother.block_groups:
-                pieces.append(samples_of(current[0], self.step_m))
+                pieces.append(current[0])
                 models.append(current[1])
                 last = max(last, int(pieces[-1].bin[-1]))
                 current, taken = next(stretches, None), taken + 1
@@ -163,11 +163,12 @@ class _PlaceFollower:
         measured = samples.measured(state.bin, end)
         fresh = samples.part(measured)
         followed = robustly(
-            moves(models, np.arange(state.bin, end)),
+            moves(models, state.bin, end),
             fresh.readings(first_bin=state.bin, step_m=self.step_m, gains=self.course.gains),
             ~fresh.suspect,
             state,
             gate=self.smoother.gate,
+            resume_bin=min(stop, end - 1),
         )
         flags = samples.flags.copy()
         flags[measured[~followed.accepted]] |= OUTLIER
@@ -184,7 +185,7 @@ class _PlaceFollower:
         )
         # outliers stay outliers when the next block looks at them again
         settled = samples.flagged(np.where(samples.bin < stop, flags, samples.flags)).part(samples.bin >= stop - 2)
-        return motion, followed.state(state.bin, min(stop, end - 1)), settled
+        return motion, followed.state, settled
 
     def _motion(
         self,

@@ -1,66 +1,63 @@
-"""Products of small matrices, for a state of blocks that all have one size."""
+"""Products of small matrices, for a state of blocks that all have one size.
+
+Vectors are rows of arrays, given by their number (see `tonearm.vector_rows`). Block diagonal matrices are given as their blocks
+one below the other, from a row on.
+"""
 
 from __future__ import annotations
 
 import numba
 
-STATES = 8
-"""Size of a block. Known to the compiler, it makes these products three times as fast."""
+from gramoscope.tonearm.vector_rows import STATES, add_outer, add_row_times, inner, mirror, multiply, transpose
+
+__all__ = ["STATES", "add_products", "block_sandwich", "block_vector", "dot", "times"]
 
 
 @numba.njit(cache=True, nogil=True)
-def _sandwich_one(a, c, x, row, column, half, out):  # type: ignore[no-untyped-def]
-    for i in range(STATES):
-        for j in range(STATES):
-            total = 0.0
-            for k in range(STATES):
-                total += a[i, k] * x[row + k, column + j]
-            half[i, j] = total
-    for i in range(STATES):
-        for j in range(STATES):
-            total = 0.0
-            for k in range(STATES):
-                total += half[i, k] * c[j, k]
-            out[row + i, column + j] = total
-            out[column + j, row + i] = total
+def block_sandwich(a, at, first, x, half, out):  # type: ignore[no-untyped-def]
+    """Write A x Aᵀ for symmetric x and a block diagonal A, given with its transpose."""
+    for b in range(0, x.shape[0], STATES):
+        for c in range(0, b + 1, STATES):
+            multiply(a, first + b, 0, x, b, c, half, 0, 0)
+            multiply(half, 0, 0, at, first + c, 0, out, b, c)
+            if b == c:
+                mirror(out, b, b)
+            else:
+                transpose(out, b, c, out, c, b)
 
 
 @numba.njit(cache=True, nogil=True)
-def block_sandwich(a, x, half, out):  # type: ignore[no-untyped-def]
-    """Write A x Aᵀ for symmetric x and a block diagonal A."""
-    for b in range(a.shape[0]):
-        for c in range(b + 1):
-            _sandwich_one(a[b], a[c], x, b * STATES, c * STATES, half, out)
+def block_vector(at, first, x, out):  # type: ignore[no-untyped-def]
+    """Write A x for a block diagonal A whose transpose is given, and vectors that are arrays by themselves."""
+    for i in range(x.size):
+        out[i] = 0.0
+    for b in range(0, x.size, STATES):
+        add_row_times(x, 0, b, at, first + b, 0, out, 0, b)
 
 
 @numba.njit(cache=True, nogil=True)
-def block_vector(a, x, out):  # type: ignore[no-untyped-def]
-    """Write A x for a block diagonal A, given as its blocks."""
-    for b in range(a.shape[0]):
-        for i in range(STATES):
-            total = 0.0
-            for k in range(STATES):
-                total += a[b, i, k] * x[b * STATES + k]
-            out[b * STATES + i] = total
-
-
-@numba.njit(cache=True, nogil=True)
-def dot(x, y):  # type: ignore[no-untyped-def]
+def dot(x, i, y, j, size):  # type: ignore[no-untyped-def]
     """Return x·y."""
     total = 0.0
-    for i in range(x.size):
-        total += x[i] * y[i]
+    for b in range(0, size, STATES):
+        total += inner(x, i, b, y, j, b)
     return total
 
 
 @numba.njit(cache=True, nogil=True)
-def times(p, h, out):  # type: ignore[no-untyped-def]
+def times(p, h, j, out):  # type: ignore[no-untyped-def]
     """Write p h for symmetric p and return hᵀ p h."""
-    size = h.size
-    for i in range(size):
+    for i in range(out.size):
         out[i] = 0.0
-    for k in range(size):
-        w = h[k]
-        for i in range(size):
-            out[i] += w * p[k, i]
-    return dot(h, out)
+    for b in range(0, out.size, STATES):
+        for c in range(0, out.size, STATES):
+            add_row_times(h, j, b, p, b, c, out, 0, c)
+    return dot(h, j, out, 0, out.size)
+
+
+@numba.njit(cache=True, nogil=True)
+def add_products(x, i, y, j, p):  # type: ignore[no-untyped-def]
+    """Add x yᵀ to p."""
+    for b in range(0, p.shape[0], STATES):
+        for c in range(0, p.shape[0], STATES):
+            add_outer(x, i, b, y, j, c, p, b, c)

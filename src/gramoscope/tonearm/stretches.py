@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
+import numba
 import numpy as np
 
 from gramoscope.conventions import INNER, OUTER, BoolArray, FloatArray
@@ -79,7 +80,9 @@ def stretch_of(trace: WallTrace) -> Stretch:
         middle_m=middle,
         suspect=suspects(place, variance, middle),
         share=np.ones(trace.flags.shape),
-        flags=(trace.flags | np.where(seen, 0, NOT_MEASURED) | np.where(sparse, Quality.SPARSE, 0)).astype(np.uint16),
+        flags=(trace.flags | np.where(seen, 0, Quality.INTERPOLATED) | np.where(sparse, Quality.SPARSE, 0)).astype(
+            np.uint16
+        ),
         step_m=trace.arc_step_m,
         correlation_samples=trace.correlation_samples,
     )
@@ -108,9 +111,56 @@ def counted_from_the_start(stretches: Iterable[Stretch]) -> Iterator[Stretch]:
         yield replace(stretch, place_m=stretch.place_m - origin, middle_m=stretch.middle_m - origin)
 
 
-def running_median(place_m: FloatArray) -> FloatArray:
+@numba.njit(cache=True, nogil=True)
+def _middle(values, known):  # type: ignore[no-untyped-def]
+    """Sort the first so many values and return their median, the lower one of two; NaN if there are none."""
+    for i in range(1, known):
+        value, j = values[i], i
+        while j > 0 and values[j - 1] > value:
+            values[j] = values[j - 1]
+            j -= 1
+        values[j] = value
+    return values[(known - 1) // 2] if known else np.nan
+
+
+@numba.njit(cache=True, nogil=True)
+def _level(place_m, i, slope, out):  # type: ignore[no-untyped-def]
+    """Write the known ones about one sample, a slope taken off, and return how many there are."""
+    known = 0
+    for k in range(max(i - REACH, 0), min(i + REACH + 1, place_m.size)):
+        if np.isfinite(place_m[k]):
+            out[known] = place_m[k] - slope * (k - i)
+            known += 1
+    return known
+
+
+@numba.njit(cache=True, nogil=True)
+def running_median(place_m):  # type: ignore[no-untyped-def]
     """Return the median of each sample and its `REACH` neighbours on each side, NaN left out; shape (2, sample)."""
-    return _median(_around(place_m))
+    out, near = np.empty_like(place_m), np.empty(2 * REACH + 1)
+    for wall in range(place_m.shape[0]):
+        for i in range(place_m.shape[1]):
+            out[wall, i] = _middle(near, _level(place_m[wall], i, 0.0, near))
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _neighbours(place_m, middle_m):  # type: ignore[no-untyped-def]
+    """Median of each sample and its neighbours and their median deviation, the slope of the course taken off."""
+    middle, spread, near = np.empty_like(place_m), np.empty_like(place_m), np.empty(2 * REACH + 1)
+    size = place_m.shape[1]
+    for wall in range(place_m.shape[0]):
+        for i in range(size):
+            slope = 0.0
+            if REACH <= i < size - REACH:
+                slope = (middle_m[wall, i + REACH] - middle_m[wall, i - REACH]) / (2 * REACH)
+            # 0 where the course is not known
+            known = _level(place_m[wall], i, slope if np.isfinite(slope) else 0.0, near)
+            middle[wall, i] = _middle(near, known)
+            for k in range(known):
+                near[k] = abs(near[k] - middle[wall, i])
+            spread[wall, i] = _middle(near, known)
+    return middle, spread
 
 
 def suspects(place_m: FloatArray, variance: FloatArray, middle_m: FloatArray) -> BoolArray:
@@ -120,35 +170,13 @@ def suspects(place_m: FloatArray, variance: FloatArray, middle_m: FloatArray) ->
     as much, to the same side or to opposite ones, it is the groove that clicks. For a first look, and for learning: what
     it takes for a sharp bend of one wall it is allowed to lose.
     """
-    slope = _slopes(middle_m)[..., None] * np.arange(-REACH, REACH + 1)
-    level = _around(place_m) - slope
-    middle = _median(level)
-    spread = _median(np.abs(level - middle[..., None]))
+    middle, spread = _neighbours(place_m, middle_m)
     away = place_m - middle
     with np.errstate(invalid="ignore"):
         wild = np.abs(away) > HAMPEL_GATE * (np.sqrt(variance) + spread)
         apart = np.minimum(np.abs(away[INNER] - away[OUTER]), np.abs(away[INNER] + away[OUTER]))
         together = apart < HAMPEL_GATE * np.sqrt(variance.sum(axis=0))
     return np.asarray(wild & ~together)
-
-
-def _around(values: FloatArray) -> FloatArray:
-    padded = np.pad(values, ((0, 0), (REACH, REACH)), constant_values=np.nan)
-    return np.lib.stride_tricks.sliding_window_view(padded, 2 * REACH + 1, axis=1)
-
-
-def _slopes(middle_m: FloatArray) -> FloatArray:
-    """Change of the running median from one sample to the next; 0 where that is not known."""
-    around = _around(middle_m)
-    slope = (around[..., -1] - around[..., 0]) / (2 * REACH)
-    return np.where(np.isfinite(slope), slope, 0.0)
-
-
-def _median(values: FloatArray) -> FloatArray:
-    """The median of the last axis without its NaN, the lower one of two; NaN where there are only those."""
-    known = np.count_nonzero(np.isfinite(values), axis=-1)
-    place = np.maximum(known - 1, 0)[..., None] // 2
-    return np.asarray(np.take_along_axis(np.sort(values, axis=-1), place, axis=-1)[..., 0])
 
 
 def _hand_over(before: Stretch, after: Stretch) -> tuple[Stretch, Stretch]:

@@ -14,7 +14,7 @@ from gramoscope.disc.formats import Direction
 from gramoscope.tonearm.course import Course
 from gramoscope.tonearm.groove_model import Beliefs, GrooveModel, agitation, beginning, beliefs, moves, robustly
 from gramoscope.tonearm.groove_prior import GroovePrior
-from gramoscope.tonearm.learn_groove import PriorLimits, learn, lesson
+from gramoscope.tonearm.learn_groove import PriorLimits, learn, lessons
 from gramoscope.tonearm.level import (
     OneDirection,
     Walls,
@@ -25,7 +25,7 @@ from gramoscope.tonearm.level import (
     one_direction,
     trusted,
 )
-from gramoscope.tonearm.place_samples import samples_of
+from gramoscope.tonearm.place_samples import PlaceSamples, samples_of
 from gramoscope.tonearm.stretches import Stretch
 
 DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
@@ -68,24 +68,20 @@ class Teacher:
     teaching: Teaching
     gate: float
 
-    def taught(self, stretches: Iterator[Stretch]) -> Iterator[tuple[Stretch, GrooveModel]]:
-        """Return each stretch with what is believed of the groove from its first sample on."""
+    def taught(self, stretches: Iterator[Stretch]) -> Iterator[tuple[PlaceSamples, GrooveModel]]:
+        """Return the samples of each stretch with what is believed of the groove from the first of them on."""
         before: Priors | None = None
         levelled = self._levelled(stretches)
         while batch := list(islice(levelled, self.teaching.groups)):
             before, error = self._learn(batch, before)
             believed = beliefs(before, self.step_m)
             for claimed, level in batch:
-                stretch = _put_right(claimed, error)
-                model = self._model(believed, stretch, level)
-                yield stretch, replace(model, agitation=self._agitation(model, stretch))
+                samples = samples_of(_put_right(claimed, error), self.step_m)
+                model = believed.model(int(samples.bin[0]), level)
+                yield samples, replace(model, agitation=self._agitation(model, samples))
 
-    def _model(self, believed: Beliefs, stretch: Stretch, level: FloatArray) -> GrooveModel:
-        return believed.model(int(np.rint(stretch.arc_m[0] / self.step_m)), level)
-
-    def _agitation(self, model: GrooveModel, stretch: Stretch) -> FloatArray:
-        samples = samples_of(stretch, self.step_m)
-        first = int(samples.bin[0])
+    def _agitation(self, model: GrooveModel, samples: PlaceSamples) -> FloatArray:
+        first = model.from_bin
         fresh = samples.part(samples.measured(first, int(samples.bin[-1]) + 1))
         readings = fresh.readings(first_bin=first, step_m=self.step_m, gains=self.course.gains)
         return agitation(model, readings, ~fresh.suspect)
@@ -113,13 +109,7 @@ class Teacher:
         teachers = [(_put_right(stretch, error), level) for stretch, level in cleaned]
         lateral, vertical = (
             learn(
-                [
-                    one
-                    for one in (
-                        lesson(self._seen(trusted(s), name), float(level[i]), self.step_m) for s, level in teachers
-                    )
-                    if one
-                ],
+                lessons(((self._seen(trusted(s), name), float(level[i])) for s, level in teachers), self.step_m),
                 self.step_m,
                 limits[i],
                 before=before[i] if before else None,
@@ -130,17 +120,18 @@ class Teacher:
 
     def _cleaned(self, believed: Beliefs, stretch: Stretch, level: FloatArray) -> Stretch:
         """The stretch with all those samples suspect that the others contradict, by what was believed so far."""
-        model = self._model(believed, stretch, level)
         samples = samples_of(stretch, self.step_m)
         first, stop = int(samples.bin[0]), int(samples.bin[-1]) + 1
+        model = believed.model(first, level)
         measured = samples.measured(first, stop)
         fresh = samples.part(measured)
         followed = robustly(
-            moves([model], np.arange(first, stop)),
+            moves([model], first, stop),
             fresh.readings(first_bin=first, step_m=self.step_m, gains=self.course.gains),
             ~fresh.suspect,
             beginning(model, first),
             gate=self.gate,
+            resume_bin=first,
         )
         suspect = samples.suspect.copy()
         suspect[measured] = ~followed.accepted

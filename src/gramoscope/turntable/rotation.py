@@ -74,18 +74,43 @@ class Rotation:
         """Return the groove speed V = ω r(s) (paper, section 7)."""
         return self.angular_speed_rad_s * self.radius_at_m(arc_m)
 
+    def angle_of_arc_rad(self, arc_m: npt.ArrayLike) -> FloatArray:
+        """Return by how much the record has turned when the stylus is at the place s; 0 at s = 0.
+
+        φ(s) = (r₀ − r(s)) 2π/p = 2 s / (r₀ + r(s)).
+        """
+        arc = np.asarray(arc_m, np.float64)
+        # the second form: nothing cancels when the pitch is small
+        return 2 * arc / (self.radius_m + self.radius_at_m(arc))
+
+    def arc_of_angle_m(self, angle_rad: npt.ArrayLike) -> FloatArray:
+        """Return the place under the stylus when the record has turned by φ; the inverse of `angle_of_arc_rad`."""
+        turned = np.asarray(angle_rad, np.float64)
+        return turned * (self.radius_m - self.pitch_m * turned / (4 * np.pi))
+
+    def angle_of_time_rad(self, time_s: npt.ArrayLike) -> FloatArray:
+        """Return by how much the record has turned at a time, ω t."""
+        return np.asarray(time_s, np.float64) * self.angular_speed_rad_s
+
+    def time_of_angle_s(self, angle_rad: npt.ArrayLike) -> FloatArray:
+        """Return when the record has turned by φ; the inverse of `angle_of_time_rad`."""
+        return np.asarray(angle_rad, np.float64) / self.angular_speed_rad_s
+
     def time_of_arc_s(self, arc_m: npt.ArrayLike) -> FloatArray:
         """Return the time at which the stylus passes the place s; 0 at s = 0."""
-        arc = np.asarray(arc_m, np.float64)
-        if self.pitch_m == 0:
-            return arc / (self.angular_speed_rad_s * self.radius_m)
-        # (r0 − r) 2π/p ÷ ω, written so that nothing cancels when the pitch is small
-        return 2 * arc / (self.radius_m + self.radius_at_m(arc)) / self.angular_speed_rad_s
+        return self.time_of_angle_s(self.angle_of_arc_rad(arc_m))
 
     def arc_of_time_m(self, time_s: npt.ArrayLike) -> FloatArray:
         """Return the place that the stylus has reached at a time; the inverse of `time_of_arc_s`."""
-        turned = np.asarray(time_s, np.float64) * self.angular_speed_rad_s
-        return turned * (self.radius_m - self.pitch_m * turned / (4 * np.pi))
+        return self.arc_of_angle_m(self.angle_of_time_rad(time_s))
+
+    def fastest_m_s(self, arc_m: float) -> float:
+        """Return the greatest groove speed from the place s inwards."""
+        return float(self.speed_at_m_s(arc_m))
+
+    def in_words(self) -> str:
+        """Return how the record turns, for the archive."""
+        return f"{self.rpm:g} rpm"
 
 
 def pixel_rate_hz(groove_speed_m_s: float, *, pixel_pitch_m: float) -> float:

@@ -57,7 +57,7 @@ def stretch(number: int, sound_px: FloatArray | float = 0.0, error_px: float = 0
     return Stretch(
         picture(number, displacement_px(number) + sound_px),
         np.ones(WIDTH, bool),
-        np.zeros((WIDTH, HEIGHT), bool),
+        np.empty((0, 2), np.int64),
         displacement_px(number) + wrong,
         np.ones((2, WIDTH)),
     )

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from gramoscope.conventions import Float32Array, FloatArray
+from gramoscope.conventions import Float32Array, FloatArray, IntArray
 
 TAPS = 10
 PHASES = 512
@@ -168,6 +168,19 @@ def across(rows: int, slope: FloatArray) -> FloatArray:
         matrix[middle, middle + slope.size + k] = tap
         matrix[middle, middle + slope.size - k] = -tap
     return matrix
+
+
+def places_of(path_row: FloatArray, half: int) -> tuple[IntArray, IntArray]:
+    """Return what `follow_rows` finds of paths of any shape.
+
+    Returns
+    -------
+    first_row, phase : int64 arrays
+        The first row that the first row of a window is interpolated from, and which taps do it.
+    """
+    floor = np.floor(path_row)
+    phase = ((path_row - floor) * PHASES + 0.5).astype(np.int64)
+    return floor.astype(np.int64) - half - BEFORE, phase
 
 
 @numba.njit(cache=True, nogil=True)

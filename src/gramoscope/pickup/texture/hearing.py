@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numba
 import numpy as np
@@ -28,7 +29,9 @@ from gramoscope.pickup.texture.likelihood import (
     within,
 )
 from gramoscope.pickup.texture.spectrum import Band, filter_columns, half_of
-from gramoscope.pickup.texture.stretch import Stretch
+
+if TYPE_CHECKING:
+    from gramoscope.pickup.texture.stretch import Stretch
 
 BURNT_SHARE = 0.15
 """Of the rows of a window in one column: a bright grain or two do no harm, a scratch does."""
@@ -144,16 +147,16 @@ def clear_columns(
 
 @numba.njit(cache=True, nogil=True)
 def _clear(usable, burnt, support, rows, half_px, least_support, burnt_share, clear):  # type: ignore[no-untyped-def]
-    """Take away what is not usable, has no support, or is burnt; beyond the picture its outermost row counts."""
-    height = burnt.shape[1]
+    """Take away what is not usable, has no support, or is burnt."""
+    spoilt = np.zeros(usable.size, np.int64)
     for i in range(rows.shape[0]):
         for x in range(usable.size):
             clear[i, x] &= usable[x] and support[i, x] >= least_support
-            if clear[i, x] and height:
-                middle, spoilt = int(np.rint(rows[i, x])), 0
-                for row in range(middle - half_px, middle + half_px + 1):
-                    spoilt += burnt[x, min(max(row, 0), height - 1)]
-                clear[i, x] = spoilt <= burnt_share * (2 * half_px + 1)
+        spoilt[:] = 0
+        for x, row in burnt:
+            spoilt[x] += abs(row - np.rint(rows[i, x])) <= half_px
+        for x, _ in burnt:
+            clear[i, x] &= spoilt[x] <= burnt_share * (2 * half_px + 1)
 
 
 @numba.njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
@@ -225,18 +228,19 @@ def add_up(said, weight, wall, information, score, sum_of_information):  # type:
 
 
 def heard(
-    ear: Ear, stretch: Stretch, layout: StripeLayout, *, least_support: float, power_limits: tuple[float, float]
+    ear: Ear, columns: Float32Array, rows: FloatArray, clear: BoolArray, *, power_limits: tuple[float, float]
 ) -> tuple[FloatArray, Float32Array]:
     """Return what the stripes say of their paths.
 
     Parameters
     ----------
     ear : Ear
-    stretch : Stretch
-        In the tone of the model.
-    layout : StripeLayout
-    least_support : float
-        See `clear_columns`.
+    columns : float32 array, shape (column, row)
+        The picture, transposed, in the tone of the model.
+    rows : float64 array, shape (stripe, column)
+        The paths.
+    clear : bool array, shape (stripe, column)
+        Where to listen, see `clear_columns`.
     power_limits : (float, float)
         Of the texture, in units of its usual power.
 
@@ -247,10 +251,9 @@ def heard(
     weight : float32 array, shape (stripe, column)
         0 … 1.
     """
-    rows, clear = clear_columns(stretch, layout, ear.number, half_px=ear.half_px, least_support=least_support)
     drawn = np.empty((len(rows), ear.length, ear.basis.shape[2]), np.float32)
     weight, said = np.empty(rows.shape, np.float32), np.empty(rows.shape)
-    _draw(stretch.columns, rows, clear, ear.half_px, ear.half_taps, ear.basis, ear.usual, power_limits, drawn, weight)
+    _draw(columns, rows, clear, ear.half_px, ear.half_taps, ear.basis, ear.usual, power_limits, drawn, weight)
     spectrum = fft.rfft(drawn, axis=1)
     through = np.zeros((len(rows), ear.sign.shape[1], spectrum.shape[1]), np.complex64)
     let_through(spectrum, ear.filters, ear.band.bins(ear.length).start, through)

@@ -20,7 +20,7 @@ from gramoscope.conventions import INNER, OUTER, Float32Array, FloatArray
 from gramoscope.disc.formats import Cut
 from gramoscope.pickup.texture.filter_bank import FilterBank
 from gramoscope.pickup.texture.following import channels, follow
-from gramoscope.pickup.texture.hearing import Ear, add_up, ear_of, heard
+from gramoscope.pickup.texture.hearing import Ear, add_up, clear_columns, ear_of
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.likelihood import StripeStatistics, quiet_power
 from gramoscope.pickup.texture.smoothing import smooth, smoothed
@@ -148,7 +148,8 @@ def evidence(stretch: Stretch, model: Model, rules: Rules, *, judged: bool = Tru
     score, information = np.zeros((2, 2, seen.columns.shape[0]))
     if not ear.number.size:
         return Evidence(score, information, np.full(2, np.nan))
-    said, weight = heard(ear, seen, model.layout, least_support=rules.least_support, power_limits=rules.power_limits)
+    rows, clear = clear_columns(seen, model.layout, ear.number, half_px=ear.half_px, least_support=rules.least_support)
+    said, weight = seen.device.heard(ear, seen.columns, rows, clear, power_limits=rules.power_limits)
     add_up(said, weight, ear.wall, ear.trust * ear.information, score, information)
     return Evidence(score, information, _surprise(ear, said, weight) if judged else np.full(2, np.nan))
 

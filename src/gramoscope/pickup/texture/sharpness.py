@@ -11,12 +11,13 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from gramoscope.conventions import Float32Array, FloatArray
+from gramoscope.conventions import Float32Array, FloatArray, IntArray
 from gramoscope.pickup.overlay import overlay_width
 from gramoscope.signal_path import ImageArray
 
 CELL_PX = 8
 """Columns in a cell."""
+CEILING = 1.5
 
 
 @numba.njit(cache=True, nogil=True)
@@ -61,7 +62,7 @@ def cell_energy(images, offset, share, total, energy):  # type: ignore[no-untype
             energy[cell, row] = _sum_of_eight(square, cell)
 
 
-def sharpness(images: ImageArray, shift_px: FloatArray, *, ceiling: float = 1.5) -> Float32Array:
+def sharpness(images: ImageArray, shift_px: FloatArray, *, ceiling: float = CEILING) -> Float32Array:
     """Return how sharp the picture of a group is, cell by cell.
 
     Parameters
@@ -77,15 +78,27 @@ def sharpness(images: ImageArray, shift_px: FloatArray, *, ceiling: float = 1.5)
     float32 array, shape (cell, row)
         Root of the energy above the noise, a little smoothed, in units of the sharpest row of a typical cell.
     """
-    width = overlay_width(images.shape[2], shift_px)
-    offset = np.minimum(np.rint(shift_px).astype(np.int64), width - images.shape[2])
-    counts = np.zeros(width)
-    for first in offset:
-        counts[first : first + images.shape[2]] += 1
+    offset, share = whole_pixels(images.shape[2], shift_px)
+    width = share.size
     energy = np.empty((width // CELL_PX, images.shape[1]), np.float32)
     small = images.dtype == np.uint8 and len(images) <= np.iinfo(np.uint16).max // np.iinfo(np.uint8).max
     total = np.empty(width, np.uint16 if small else np.uint32)
-    cell_energy(images, offset, (1 / np.maximum(counts, 1)).astype(np.float32), total, energy)
+    cell_energy(images, offset, share, total, energy)
+    return sharpness_of(energy, ceiling=ceiling)
+
+
+def whole_pixels(frame_width: int, shift_px: FloatArray) -> tuple[IntArray, Float32Array]:
+    """Return where the frames begin, laid over each other by whole pixels, and one over how many lie in each column."""
+    width = overlay_width(frame_width, shift_px)
+    offset = np.minimum(np.rint(shift_px).astype(np.int64), width - frame_width)
+    counts = np.zeros(width)
+    for first in offset:
+        counts[first : first + frame_width] += 1
+    return offset, (1 / np.maximum(counts, 1)).astype(np.float32)
+
+
+def sharpness_of(energy: Float32Array, *, ceiling: float = CEILING) -> Float32Array:
+    """Return how sharp cells of such energies are, see `sharpness`."""
     sharp = np.empty_like(energy)
     _smooth(energy, sharp)
     # a row is quiet all along the stretch, or it is not

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
-from gramoscope.conventions import BoolArray, Float32Array, FloatArray
+from gramoscope.conventions import BoolArray, FloatArray, IntArray
+from gramoscope.pickup.device import Device, Kept
+from gramoscope.pickup.processor import Processor
 from gramoscope.pickup.texture.tone import Tone
 
 AS_IT_IS = Tone()
@@ -17,32 +19,35 @@ class Stretch:
     Attributes
     ----------
     columns : float32 array, shape (column, row)
-        The registered picture, transposed.
+        The registered picture, transposed; where the device keeps it.
     usable : bool array, shape (column,)
         Columns that rest on enough frames.
-    burnt : bool array, shape (column, row)
-        Places at full scale; of no rows at all when there are none.
+    burnt : int64 array, shape (place, 2)
+        Column and row of each place at full scale.
     displacement_px : float64 array, shape (2, column)
         The present path of each wall.
     support : float64 array, shape (stripe, column)
         How sharp the coarse search found each stripe.
     tone : Tone
         In which the picture is seen: before it is interpolated, for bright grains ring less then.
+    device : Device
+        Where the picture lies and is heard.
     """
 
-    columns: Float32Array
+    columns: Kept
     usable: BoolArray
-    burnt: BoolArray
+    burnt: IntArray
     displacement_px: FloatArray
     support: FloatArray
     tone: Tone = AS_IT_IS
+    device: Device = field(default_factory=Processor)
 
     def in_tone(self, tone: Tone) -> Stretch:
         """Return the same stretch seen in a tone; only a picture that is as it was can be seen in another one."""
         if tone == self.tone or tone.compression == self.tone.compression == 0:
             return self
         assert self.tone.compression == 0
-        return replace(self, columns=tone(self.columns), tone=tone)
+        return replace(self, columns=self.device.in_tone(self.columns, tone), tone=tone)
 
     def moved(self, step_px: FloatArray) -> Stretch:
         """Return the same stretch with its paths moved, shape (2, column)."""

@@ -1,0 +1,74 @@
+"""Hints at the true speed that lie in the sound itself. They are told, and never acted on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from gramoscope.listening.mains_hum import HumFinding, HumListener
+from gramoscope.listening.tuning import TuningFinding, TuningListener
+from gramoscope.signal_path import Audio
+
+
+@dataclass
+class Hints:
+    """Listens to the flat transfer for clocks.
+
+    Parameters
+    ----------
+    rpm : float
+        The speed at which it plays.
+    rate_hz : float
+    """
+
+    rpm: float
+    rate_hz: float
+
+    def __post_init__(self) -> None:
+        self._hum, self._tuning = HumListener(self.rate_hz), TuningListener(self.rate_hz)
+
+    def hear(self, piece: Audio) -> None:
+        """Take in the next piece."""
+        self._hum.hear(piece)
+        self._tuning.hear(piece)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what the report says of them."""
+        hum, tuning = self._hum.finding(), self._tuning.finding()
+        return {"mains_hum": self._of_hum(hum), "tuning": self._of_tuning(tuning)}
+
+    def _of_hum(self, found: HumFinding) -> dict[str, Any]:
+        if found.reason is not None:
+            return {"line_hz": None, "reason": found.reason}
+        relative = found.sigma_hz / found.line_hz
+        rpm = {mains: self.rpm * mains / found.line_hz for mains in found.mains_hz()}
+        turns = " or ".join(f"at {each:.2f} ± {each * relative:.2f} rpm ({mains:g} Hz)" for mains, each in rpm.items())
+        return {
+            "line_hz": found.line_hz,
+            "sigma_hz": found.sigma_hz,
+            "harmonics": found.harmonics,
+            "above_surroundings_db": found.above_surroundings_db,
+            "speeds": [{"mains_hz": mains, "rpm": each, "sigma_rpm": each * relative} for mains, each in rpm.items()],
+            "words": (
+                f"a steady line at {found.line_hz:.2f} ± {found.sigma_hz:.2f} Hz; "
+                f"if it was mains hum, the record should turn {turns}"
+            ),
+            "reason": None,
+        }
+
+    def _of_tuning(self, found: TuningFinding) -> dict[str, Any]:
+        if found.reason is not None:
+            return {"cents": None, "reason": found.reason}
+        rpm = self.rpm / found.factor
+        return {
+            "cents": found.cents,
+            "sigma_cents": found.sigma_cents,
+            "a_hz": found.a_hz,
+            "partials": found.partials,
+            "rpm": rpm,
+            "words": (
+                f"tuned {found.cents:+.1f} ± {found.sigma_cents:.1f} cents from A = 440 Hz, an A of {found.a_hz:.1f} Hz; "
+                f"with an A of 440 the record should turn at {rpm:.2f} rpm"
+            ),
+            "reason": None,
+        }

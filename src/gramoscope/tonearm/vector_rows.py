@@ -1,0 +1,170 @@
+"""Matrices of 8 × 8 whose rows are vectors of the processor: what a compiler does not find by itself.
+
+Numba's loops over eight numbers become eight scalar instructions each; told that a row is one vector, LLVM makes one or two of
+them, whatever the processor has, and a product takes a fifth of the time. Each matrix, and each vector, is given by an array of
+float64 and the row and the column of it where it begins, for making views costs as much as a product; of an array with one
+dimension the row is 0. The rows of an array lie in one piece each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+STATES = 8
+"""Length of a row."""
+_DOUBLE, _LONG, _INT = ir.DoubleType(), ir.IntType(64), ir.IntType(32)
+_ROW = ir.VectorType(_DOUBLE, STATES)
+_ANY = ir.Constant(_ROW, ir.Undefined)
+_EACH = range(STATES)
+Value = Any
+"""Of LLVM, in the making."""
+_compiled: Any = intrinsic
+"""Numba's own types count the context, which only the compiler gives, as an argument."""
+
+
+class _Writer:
+    """Writes code about the rows of matrices, which are counted 0, 1, … in the order of the arguments."""
+
+    def __init__(self, context: Any, builder: Any, signature: Any, arguments: Any) -> None:
+        self.builder = builder
+        self._matrices = []
+        for i in range(0, len(arguments), 3):
+            array = context.make_array(signature.args[i])(context, builder, arguments[i])
+            row, column = (context.cast(builder, arguments[i + k], signature.args[i + k], types.intp) for k in (1, 2))
+            stride = builder.extract_value(array.strides, 0)
+            first = builder.add(builder.mul(row, stride), builder.mul(column, ir.Constant(_LONG, 8)))
+            begin = builder.gep(builder.bitcast(array.data, ir.IntType(8).as_pointer()), [first])
+            self._matrices.append((begin, stride))
+
+    def _row(self, matrix: int, row: int) -> Value:
+        begin, stride = self._matrices[matrix]
+        return self.builder.gep(begin, [self.builder.mul(stride, ir.Constant(_LONG, row))]) if row else begin
+
+    def load(self, matrix: int, row: int = 0) -> Value:
+        return self.builder.load(self.builder.bitcast(self._row(matrix, row), _ROW.as_pointer()), align=8)
+
+    def store(self, value: Value, matrix: int, row: int = 0) -> None:
+        self.builder.store(value, self.builder.bitcast(self._row(matrix, row), _ROW.as_pointer()), align=8)
+
+    def spread(self, matrix: int, row: int, column: int) -> Value:
+        """One element, in all places of a row."""
+        begin = self.builder.bitcast(self._row(matrix, row), _DOUBLE.as_pointer())
+        value = self.builder.load(self.builder.gep(begin, [ir.Constant(_LONG, column)]))
+        return self.choose(self.builder.insert_element(_ANY, value, ir.Constant(_INT, 0)), _ANY, [0] * STATES)
+
+    def choose(self, one: Value, other: Value, which: list[int]) -> Value:
+        """Elements of two rows; those of the other count from 8."""
+        mask = ir.Constant(ir.VectorType(_INT, STATES), [ir.Constant(_INT, i) for i in which])
+        return self.builder.shuffle_vector(one, other, mask)
+
+    def times_and(self, one: Value, other: Value, more: Value) -> Value:
+        """The product of two rows, and one more row added."""
+        kind = ir.FunctionType(_ROW, [_ROW] * 3)
+        call = self.builder.module.declare_intrinsic(f"llvm.fmuladd.v{STATES}f64", fnty=kind)
+        return self.builder.call(call, [one, other, more])
+
+    def transposed(self, rows: list[Value]) -> list[Value]:
+        """Exchange halves, then quarters, then neighbours."""
+        rows = list(rows)
+        for far in (4, 2, 1):
+            for i in [i for i in _EACH if not i & far]:
+                one, other = rows[i], rows[i + far]
+                rows[i] = self.choose(one, other, [STATES + j - far if j & far else j for j in _EACH])
+                rows[i + far] = self.choose(one, other, [STATES + j if j & far else j + far for j in _EACH])
+        return rows
+
+    def total(self, row: Value) -> Value:
+        """The sum of a row."""
+        for far in (4, 2, 1):
+            row = self.builder.fadd(row, self.choose(row, _ANY, [(j + far) % STATES for j in _EACH]))
+        return self.builder.extract_element(row, ir.Constant(_INT, 0))
+
+
+def _function(result: Any, arguments: tuple[Any, ...], write: Callable[[_Writer], Value]) -> Any:
+    """Signature and code of a function that Numba can call."""
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Value:
+        written = write(_Writer(context, builder, signature, values))
+        return context.get_dummy_value() if written is None else written
+
+    return result(*arguments), generate
+
+
+def _matrix_product(write: _Writer) -> None:
+    x = [write.load(1, k) for k in _EACH]
+    for i in _EACH:
+        total = write.builder.fmul(write.spread(0, i, 0), x[0])
+        for k in _EACH[1:]:
+            total = write.times_and(write.spread(0, i, k), x[k], total)
+        write.store(total, 2, i)
+
+
+def _vector_product(write: _Writer) -> None:
+    even, odd = write.load(2), write.builder.fmul(write.spread(0, 0, 1), write.load(1, 1))
+    for k in _EACH[::2]:
+        even = write.times_and(write.spread(0, 0, k), write.load(1, k), even)
+    for k in _EACH[3::2]:
+        odd = write.times_and(write.spread(0, 0, k), write.load(1, k), odd)
+    write.store(write.builder.fadd(even, odd), 2)
+
+
+def _outer_product(write: _Writer) -> None:
+    y = write.load(1)
+    for i in _EACH:
+        write.store(write.times_and(write.spread(0, 0, i), y, write.load(2, i)), 2, i)
+
+
+def _inner_product(write: _Writer) -> Value:
+    return write.total(write.builder.fmul(write.load(0), write.load(1)))
+
+
+def _transposition(write: _Writer) -> None:
+    for i, row in enumerate(write.transposed([write.load(0, k) for k in _EACH])):
+        write.store(row, 1, i)
+
+
+def _symmetry(write: _Writer) -> None:
+    rows = [write.load(0, k) for k in _EACH]
+    for i, column in enumerate(write.transposed(rows)):
+        write.store(write.choose(rows[i], column, [j if j <= i else STATES + j for j in _EACH]), 0, i)
+
+
+@_compiled
+def multiply(_, a, a_row, a_column, x, x_row, x_column, out, row, column):  # type: ignore[no-untyped-def]
+    """Write a x; the result may lie where a does."""
+    return _function(types.void, (a, a_row, a_column, x, x_row, x_column, out, row, column), _matrix_product)
+
+
+@_compiled
+def add_row_times(_, h, h_row, h_column, x, x_row, x_column, out, row, column):  # type: ignore[no-untyped-def]
+    """Add the vector h x to another."""
+    return _function(types.void, (h, h_row, h_column, x, x_row, x_column, out, row, column), _vector_product)
+
+
+@_compiled
+def add_outer(_, x, x_row, x_column, y, y_row, y_column, out, row, column):  # type: ignore[no-untyped-def]
+    """Add the matrix x yᵀ to another."""
+    return _function(types.void, (x, x_row, x_column, y, y_row, y_column, out, row, column), _outer_product)
+
+
+@_compiled
+def inner(_, x, x_row, x_column, y, y_row, y_column):  # type: ignore[no-untyped-def]
+    """Return x·y."""
+    return _function(types.float64, (x, x_row, x_column, y, y_row, y_column), _inner_product)
+
+
+@_compiled
+def transpose(_, x, x_row, x_column, out, row, column):  # type: ignore[no-untyped-def]
+    """Write xᵀ."""
+    return _function(types.void, (x, x_row, x_column, out, row, column), _transposition)
+
+
+@_compiled
+def mirror(_, x, x_row, x_column):  # type: ignore[no-untyped-def]
+    """Make x symmetric, by what is on and below its diagonal."""
+    return _function(types.void, (x, x_row, x_column), _symmetry)
