@@ -80,7 +80,9 @@ def stretch_of(trace: WallTrace) -> Stretch:
         middle_m=middle,
         suspect=suspects(place, variance, middle),
         share=np.ones(trace.flags.shape),
-        flags=(trace.flags | np.where(seen, 0, Quality.INTERPOLATED) | np.where(sparse, Quality.SPARSE, 0)).astype(np.uint16),
+        flags=(trace.flags | np.where(seen, 0, Quality.INTERPOLATED) | np.where(sparse, Quality.SPARSE, 0)).astype(
+            np.uint16
+        ),
         step_m=trace.arc_step_m,
         correlation_samples=trace.correlation_samples,
     )
