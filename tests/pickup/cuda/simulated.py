@@ -30,8 +30,6 @@ from gramoscope.signal_path import FrameGroup
 CARD = GraphicsCard("simulated")
 # each is a thread of the system in the simulator
 film_kernels.PAIR_THREADS = 8
-film_kernels.ENERGY_COLUMNS = 16
-film_kernels.ENERGY_ROOM = 16 + 2 * film_kernels.BESIDE
 HEIGHT, WIDTH, STEP_PX = 18, 90, 7.3
 LOST = np.array([True, True, False, True])
 
