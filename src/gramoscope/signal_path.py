@@ -5,6 +5,7 @@
     FrameGroup                     the film of one stretch of groove
       │ pickup                     flow → focus → stripes → where each wall runs
     WallTrace                      both walls of one stretch, with error bars
+      ╎ (a photograph goes StillPicture → GrooveEdges → WallTrace: apparatus.still, pickup.edges)
       │ tonearm                    splice → smooth
     GrooveMotion                   the groove's velocity along the whole passage, piece by piece
       │ preamp                     place → time
@@ -69,6 +70,68 @@ class FrameGroup:
     def usable_images(self) -> ImageArray:
         """The valid frames; a view when all are."""
         return self.images if self.valid.all() else self.images[self.valid]
+
+
+@dataclass(frozen=True, eq=False)
+class StillPicture:
+    """A plain photograph of grooves whose edges are sharp: one micrograph, one line scan, one stretch of an unrolled disc.
+
+    Attributes
+    ----------
+    number : int
+        Which picture of the capture this is, from 0.
+    image : uint8 or uint16 array, shape (row, column)
+        Grey, canonical (see `gramoscope.conventions`): s grows with the column, l with the row, so that the groove that
+        plays first has the smallest row.
+    arc_start_m : float
+        Nominal place s of column 0.
+    lateral_start_m : float
+        Nominal place l of row 0.
+    pixel_pitch_m : float
+        One pixel, measured on the record; an arbitrary one when nobody knows.
+    white_level : int
+        The pixel value of full scale, 2**bits − 1.
+    seen : bool array, shape (row, column)
+        Which pixels show the record; False in corners that an unrolled disc does not reach.
+    problems : tuple of str
+        What was found wrong while reading, in words, empty when all is well.
+    """
+
+    number: int
+    image: ImageArray
+    arc_start_m: float
+    lateral_start_m: float
+    pixel_pitch_m: float
+    white_level: int
+    seen: npt.NDArray[np.bool_]
+    problems: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class GrooveEdges:
+    """The edges of one groove in one picture, column by column.
+
+    Attributes
+    ----------
+    number : int
+        Which groove of the picture, from 0, in playing order: by growing row.
+    row_px, row_sigma_px : float64 arrays, shape (2, column)
+        Row at which the wall meets the land, of the inner and the outer wall (`INNER`, `OUTER`), sub-pixel, and its
+        standard error; NaN where nothing was seen of it. One entry for each column of the picture.
+    correlation_samples : float
+        How many neighbouring columns share one error.
+    flags : uint16 array, shape (2, column)
+    bottom_row_px, bottom_row_sigma_px : float64 arrays, shape (column,)
+        The line along the bottom of the groove, NaN where it is not seen.
+    """
+
+    number: int
+    row_px: FloatArray
+    row_sigma_px: FloatArray
+    correlation_samples: float
+    flags: FlagArray
+    bottom_row_px: FloatArray
+    bottom_row_sigma_px: FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -121,8 +121,8 @@ class TextureLikelihood:
         pickup = replace(unread, layout=layout)
 
         def prepared(i: int) -> Stretch:
-            film, _ = self.exposure.sort_out(group(seen[i].number))
-            return pickup.stretch(Processor().film(film), seen[i], paths[i])[0]
+            usable, _ = self.exposure.sort_out(group(seen[i].number))
+            return pickup.stretch(Processor().film(usable), seen[i], paths[i])[0]
 
         stretches = list(spread(prepared, range(len(seen))))
         told(numbers.size)
@@ -135,8 +135,8 @@ class TextureLikelihood:
 
     def sight(self, group: FrameGroup) -> Sight | None:
         """Return what the coarse search needs of a group; None when no frame is usable."""
-        film, _ = self.exposure.sort_out(group)
-        return sight_of(Processor().film(film)) if film.valid.any() else None
+        usable, _ = self.exposure.sort_out(group)
+        return sight_of(Processor().film(usable)) if usable.valid.any() else None
 
 
 @dataclass(frozen=True, eq=False)

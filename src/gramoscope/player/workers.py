@@ -32,7 +32,7 @@ def in_order(
     workers : int
         Threads, each with one task at a time.
     ahead : int
-        At most so many tasks are begun or answered and not yet asked for, or one more than there are workers.
+        At most so many tasks are begun or answered and not yet asked for, or as many as there are workers if those are more.
 
     Yields
     ------

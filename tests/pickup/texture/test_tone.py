@@ -62,6 +62,12 @@ def test_impossible_tones_are_refused(level: float, compression: float, said: st
 
 
 def test_the_mean_level_is_that_of_the_usual_picture() -> None:
-    pictures = [np.array([[0, 2 * level]], np.float32) for level in (30.0, 33.0, 250.0)]
+    pictures = [np.array([[0.5 * level, 1.5 * level]], np.float32) for level in (30.0, 33.0, 250.0)]
     assert mean_level(pictures) == 33.0
     assert Tone(mean_level([np.zeros((4, 4), np.float32)])).level == 0.01
+
+
+def test_what_was_not_drawn_does_not_darken_the_mean() -> None:
+    picture = np.full((30, 40), 80.0, np.float32)
+    picture[:, 15:] = 0
+    assert mean_level([picture] * 3) == pytest.approx(80.0)

@@ -16,7 +16,7 @@ from gramoscope.pickup.overlay import overlay_width
 from gramoscope.signal_path import ImageArray
 
 CELL_PX = 8
-"""Columns in a cell."""
+"""Columns in a cell; `_sum_of_eight` adds so many."""
 CEILING = 1.5
 
 

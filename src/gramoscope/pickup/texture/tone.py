@@ -106,6 +106,9 @@ BLOCK = 1024
 
 
 def mean_level(pictures: list[Float32Array]) -> float:
-    """Return the median of the pictures' mean grey levels, at least a hundredth of a level."""
-    means: FloatArray = np.array([float(np.mean(picture)) for picture in pictures])
+    """Return the median of the pictures' mean grey levels, at least a hundredth of a level.
+
+    Only the parts of a picture that were drawn count (`overlay`): the others are black.
+    """
+    means: FloatArray = np.array([float(picture.sum()) / max(int(np.count_nonzero(picture)), 1) for picture in pictures])
     return max(float(np.median(means)), 0.01)
