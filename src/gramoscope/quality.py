@@ -2,8 +2,7 @@
 
 Flags travel with the samples from the pickup to the report. A sample without flags is a measurement; `INTERPOLATED` means
 that nobody saw the groove there and the value comes from its surroundings, `DECLICKED` that somebody chose to do without what
-was seen. Several bits can stand together, as cause and
-consequence: ``NO_STRIPE | INTERPOLATED``.
+was seen. Several bits can stand together, as cause and consequence: ``NO_STRIPE | INTERPOLATED``.
 """
 
 from __future__ import annotations
@@ -47,6 +46,8 @@ _MEANINGS: dict[Quality, str] = {
 }
 
 NOT_MEASURED = Quality.INTERPOLATED | Quality.DECLICKED
+REPAIRS = Quality.DECLICKED | Quality.DECRACKLED
+"""Flags that a repair sets; a reading, and `flat.wav`, never has them."""
 
 
 def describe(flag: Quality) -> str:

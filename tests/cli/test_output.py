@@ -53,7 +53,9 @@ def test_play_writes_the_archives_words_and_flac_and_tells_what_was_clipped(
     answer = gramoscope("play", capture, "--out", tmp_path / "o", *words, *sound, *quickly)
     assert answer.code == 0
     assert str(tmp_path / "o" / "walls.flac") in answer.out
-    assert "beyond full scale (1 cm/s) were clipped; play again with --full-scale-cm-s 2" in answer.out
+    told = " ".join(answer.out.split())
+    assert "samples beyond full scale (1 cm/s) were clipped: " in told
+    assert "the scale to try next is --full-scale-cm-s 2" in told
     bext = wavinfo.WavInfoReader(str(tmp_path / "o" / "flat.wav")).bext
     assert (bext.originator, bext.originator_ref) == ("The archive", "A/1")
     assert bext.description.startswith("Side B. ")

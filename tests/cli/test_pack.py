@@ -43,7 +43,7 @@ def test_pack_makes_a_valid_bag_beside_the_transfer_and_tells(
     assert answer.code == 0, answer.err
     bag = transfer.with_name("side-b-bag")
     assert bagit.Bag(str(bag)).validate()
-    for words in (str(bag), "10 files", "copied; every sum holds", "The archive", "B/2", "lateral cut, 78 rpm"):
+    for words in (str(bag), "11 files", "copied; every sum holds", "The archive", "B/2", "lateral cut, 78 rpm"):
         assert words in answer.out
     assert "Checking the bag" in answer.err
     info = bagit.Bag(str(bag)).info

@@ -95,3 +95,15 @@ def test_repaired_and_difference_add_up_to_the_raw_file_bit_for_bit(tmp_path: Pa
         inside = np.abs(repaired) < full_scale_m_s
         inside[10:13] = False
         np.testing.assert_allclose(left[inside], repaired[inside], atol=full_scale_m_s * 2**-24 * 1.001)
+
+
+def test_what_is_still_beyond_full_scale_after_repair_is_clipped_and_counted_by_the_file(tmp_path: Path) -> None:
+    raw, repaired = np.array([0.9, -0.9, 0.9, 0.2]), np.array([0.7, -0.6, 0.1, 0.2])
+    left, taken = reversible(raw, repaired, full_scale_m_s=0.5)
+    whole = []
+    for name, sound, clipped in (("raw", raw, 3), ("left", left, 2), ("taken", taken, 0)):
+        with WavWriter(tmp_path / f"{name}.wav", rate_hz=RATE_HZ, full_scale_m_s=0.5) as file:
+            file.write(sound)
+        assert file.clipped_samples == clipped, name
+        whole.append(soundfile.read(tmp_path / f"{name}.wav", dtype="int32")[0] >> 8)
+    np.testing.assert_array_equal(whole[1] + whole[2], whole[0])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +13,13 @@ import pytest
 from gramoscope.apparatus.capture import open_capture
 from gramoscope.cli.main import main
 from gramoscope.errors import ArgumentError, CaptureError
+from gramoscope.pickup.processor import PROCESSOR
 from gramoscope.player.again import load_again
 from gramoscope.player.play import Settings
 from gramoscope.player.provenance import recipe_of, settings_of
 from gramoscope.player.recipe import load_recipe, shipped_recipes
+from gramoscope.player.speed import Speed
+from gramoscope.turntable.speed_curve import SpeedCurve
 
 SOUNDS = ("flat.wav", "walls.wav", "vertical.wav", "equalised.wav")
 WORDS = (
@@ -78,8 +80,9 @@ def test_the_report_holds_every_setting_that_matters(first: Path) -> None:
         "characteristic_name": "columbia-78",
         "full_scale_m_s": 0.375,
         "flac": True,
+        "speed": {"rpm": None, "name": "", "origin": "", "curve": None, "remove_wow": False},
     }
-    assert set(_report(first)["settings"]) | {"workers", "catalogue"} == set(Settings.__dataclass_fields__)
+    assert set(_report(first)["settings"]) | {"workers", "catalogue", "device"} == set(Settings.__dataclass_fields__)
 
 
 def test_a_capture_that_was_moved_and_renamed_is_played_as_what_it_was(
@@ -190,29 +193,37 @@ def test_settings_of_a_later_version_are_refused(first: Path, tmp_path: Path, fi
         again.settings(film, 1)
 
 
-@dataclass(frozen=True)
-class _Speed:
-    knots: tuple[float, ...] = ()
-
-
-@dataclass(frozen=True)
-class _MoreSettings(Settings):
-    speed: _Speed = field(default_factory=_Speed)
-
-
-def test_settings_that_are_tables_come_back_as_what_they_were(
-    first: Path, capture: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("gramoscope.player.play.Settings", _MoreSettings)
-    chosen = _MoreSettings(speed=_Speed((78.26, 77.92)), flac=True)
-    settings = json.loads(json.dumps(settings_of(chosen)))
-    assert settings["speed"] == {"knots": [78.26, 77.92]}
+def test_a_speed_comes_back_as_what_it_was(first: Path, capture: Path, tmp_path: Path) -> None:
+    speed = Speed(name="drift.csv", curve=SpeedCurve((0.0, 12.5), (78.26, 77.92)), remove_wow=True)
+    settings = json.loads(json.dumps(settings_of(Settings(speed=speed))))
     again = load_again(_changed(first, tmp_path / "x", settings=settings)).settings(open_capture(capture), 3)
-    assert isinstance(again, _MoreSettings)
-    assert (again.speed, again.flac, again.workers) == (chosen.speed, True, 3)
-    wrong = load_again(_changed(first, tmp_path / "y", settings={**settings, "speed": {"knots": "fast"}}))
+    assert (again.speed, again.workers, again.device) == (speed, 3, PROCESSOR)
+    assert hash(again.speed) == hash(speed), "tuples, not lists"
+    settings["speed"]["curve"]["rpm"] = "fast"
+    wrong = load_again(_changed(first, tmp_path / "y", settings=settings))
     with pytest.raises(ArgumentError, match=r"settings\.speed"):
         wrong.settings(open_capture(capture), 1)
+
+
+def test_what_was_read_on_a_card_is_read_on_a_card_again(first: Path, capture: Path, tmp_path: Path) -> None:
+    again = load_again(_changed(first, tmp_path / "x", device="abacus: wooden"))
+    with pytest.raises(ArgumentError, match="device 'abacus'"):
+        again.settings(open_capture(capture), 1)
+
+
+def test_repairs_and_a_speed_curve_are_repeated_to_the_bit(
+    capture: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("drift.csv").write_text("time_s,rpm\n0,78\n0.01,79\n", encoding="utf-8")
+    chosen = ("--declick", "--decrackle", "--rumble-hz", "25", "--speed-curve", "drift.csv")
+    assert main(["play", str(capture), "--out", "one", "--recipe", "seed-paper", "--quiet", *chosen]) == 0
+    Path("drift.csv").unlink()
+    assert main(["play", "--again", "one/report.json", "--quiet"]) == 0
+    again = _report(Path("one-again"))["again"]
+    assert again["same_files"] == [*SOUNDS, "repaired.wav", "difference.wav"]
+    assert again["other_files"] == []
+    assert Path("one-again/cues.json").read_bytes() == Path("one/cues.json").read_bytes()
 
 
 @pytest.mark.parametrize("name", shipped_recipes())

@@ -33,12 +33,14 @@ from gramoscope.player.outputs import Outputs
 from gramoscope.player.pack import BagLabel, pack
 from gramoscope.player.play import Settings
 from gramoscope.player.provenance import InputHashes
-from gramoscope.player.recipe import load_recipe
+from gramoscope.player.recipe import load_recipe, with_repairs
 from gramoscope.player.report import transfer_report
-from gramoscope.player.tracks import TRACKS, alone
+from gramoscope.player.speed import Speed
+from gramoscope.player.tracks import alone, tracks_of
 from gramoscope.quality import Quality
 from gramoscope.signal_path import Audio
 from gramoscope.turntable.rotation import Rotation
+from gramoscope.turntable.speed_curve import SpeedCurve
 
 SAMPLES = 700
 LABEL = BagLabel(bagged=date(2031, 2, 13))
@@ -60,18 +62,25 @@ def _transfer(
     curve: str = "riaa",
     flags: Quality | None = None,
     flac: bool = False,
+    repaired: bool = False,
+    speed: Speed | None = None,
     **words: str,
 ) -> Path:
     """What `play` leaves, by its own writers, without a film."""
     bench = Bench(disc=Disc(cut=cut, groove_width_m=152.4e-6, notes=NOTES), rotation=Rotation(rpm, 0.115))
-    recipe = load_recipe("seed-paper")
-    settings = Settings(characteristic_name=curve, flac=flac, catalogue=Catalogue(**words))
+    recipe = with_repairs(load_recipe("seed-paper"), declick=False, decrackle=repaired, rumble_hz=None)
+    settings = Settings(
+        characteristic_name=curve,
+        flac=flac,
+        catalogue=Catalogue(**words),
+        speed=speed if speed is not None else Speed(),
+    )
     capture = SimpleNamespace(folder=Path("films/side-b"), layout="tiff", bench=bench, problems=(), common_files=list)
-    tracks = {track: metadata_of(track, bench, recipe, settings, capture_name="side-b") for track in TRACKS}
+    tracks = {track: metadata_of(track, bench, recipe, settings, capture_name="side-b") for track in tracks_of(recipe)}
     monitor, audio = Monitor(), _audio(flags or Quality(0))
     monitor.heard(audio)
     with Outputs(folder, tracks, rate_hz=settings.rate_hz, full_scale_m_s=0.5, flac=flac) as files:
-        for track in TRACKS:
+        for track in tracks_of(recipe):
             for _ in files.kept(track, [audio], alone if len(track.channels) == 1 else lambda piece: (piece, piece)):
                 pass
         pickup: Any = SimpleNamespace(walls=("inner", "outer"), calibration={})
@@ -180,7 +189,7 @@ def test_what_is_on_the_bag_comes_from_the_transfer_and_from_the_archive(tmp_pat
         "Kalinka, Хор, Orfej, B; optical transfer of a gramophone record, lateral cut, 78.26 rpm, 0.007 s"
     )
     assert said["Bagging-Date"] == "2031-02-13"
-    assert re.fullmatch(r"\d+\.10", said["Payload-Oxum"])
+    assert re.fullmatch(r"\d+\.11", said["Payload-Oxum"])
     assert re.fullmatch(r"\d+\.\d kB", said["Bag-Size"])
     assert said["Bag-Software-Agent"].startswith("Gramoscope ")
     assert "Contact-Name" not in said, "what nobody gave is left out"
@@ -282,8 +291,6 @@ def test_a_number_that_nobody_could_give_is_absent(tmp_path: Path) -> None:
     report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     report["noise_estimate"]["signal_to_noise_db"] = None
     report["files"]["equalised.wav"]["characteristic"] = "of the house"
-    report["files"]["cues.json"] = {"what": "no sound"}
-    (folder / "cues.json").write_text("[]")
     (folder / "report.json").write_text(json.dumps(report), encoding="utf-8")
     pack(folder, tmp_path / "bag", LABEL)
     technical = _technical(tmp_path / "bag")
@@ -291,7 +298,37 @@ def test_a_number_that_nobody_could_give_is_absent(tmp_path: Path) -> None:
     assert "sigmaRms" in technical["quality"]
     assert "phonoPreamp" not in _sound(technical, "equalised.wav")
     assert len(technical["files"]) == 4
-    assert (tmp_path / "bag" / "data" / "cues.json").is_file()
+
+
+def test_a_repair_goes_along_and_is_told(tmp_path: Path) -> None:
+    folder = _transfer(tmp_path / "t", repaired=True)
+    pack(folder, tmp_path / "bag", LABEL)
+    technical = _technical(tmp_path / "bag")
+    names = {file["filename"] for file in technical["files"]}
+    assert {"data/repaired.wav", "data/difference.wav"} < names
+    assert _sound(technical, "equalised.wav")["madeOf"] == "data/repaired.wav"
+    assert "small pulses" in " ".join(_sound(technical, "repaired.wav")["codingHistory"])
+    assert _sound(technical, "repaired.wav")["phonoPreamp"]["eq"] == "none"
+    crackle = next(note for note in technical["signalNotes"] if note["note"] == "Crackle")
+    assert crackle["status"] in ("found", "not found")
+    assert "decrackling" in crackle["basis"]
+    for name in ("cues.json", "labels.txt"):
+        assert (tmp_path / "bag" / "data" / name).is_file()
+        spoilt = shutil.copytree(folder, tmp_path / f"without-{name}")
+        (spoilt / name).unlink()
+        with pytest.raises(TransferError, match=name):
+            pack(spoilt, tmp_path / "none", LABEL)
+
+
+def test_a_speed_that_was_chosen_is_the_one_that_is_told(tmp_path: Path) -> None:
+    folder = _transfer(tmp_path / "t", speed=Speed.chosen("78-us", None))
+    info = pack(folder, tmp_path / "bag", LABEL)["bag_info"]
+    assert "78.261 rpm" in info["External-Description"]
+    assert _technical(tmp_path / "bag")["playingSpeed"]["measure"] == pytest.approx(78.26, abs=0.001)
+    drifting = _transfer(tmp_path / "u", speed=Speed(name="x", curve=SpeedCurve((0.0, 9.0), (78.0, 76.5))))
+    assert "76.5 to 78 rpm" in pack(drifting, tmp_path / "two", LABEL)["bag_info"]["External-Description"]
+    range_rpm = {"lowest": 76.5, "highest": 78.0, "unit": "rpm"}
+    assert _technical(tmp_path / "two")["playingSpeedRange"] == range_rpm
 
 
 @pytest.mark.parametrize("links", [True, False], ids=["one disk", "two disks"])

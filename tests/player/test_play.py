@@ -83,8 +83,8 @@ def test_another_full_scale_is_the_same_sound_and_what_does_not_fit_is_told(
     np.testing.assert_allclose(softer, np.clip(flat, -1, 1), atol=1e-5)
     clipped = int(np.count_nonzero(np.abs(flat) > 1))
     assert small.report["files"]["flat.wav"]["clipped_samples"] == clipped > 0
-    (remark,) = (remark for remark in small.report["remarks"] if remark.startswith("flat.wav"))
-    assert f"{clipped} samples" in remark
+    (remark,) = (remark for remark in small.report["remarks"] if "clipped" in remark)
+    assert f"{clipped} in flat.wav" in remark
     assert "--full-scale-cm-s 4" in remark
     assert not any("clipped" in remark for remark in transfer.report["remarks"])
 

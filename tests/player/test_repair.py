@@ -82,7 +82,7 @@ def test_a_table_in_the_recipe_asks_for_a_repair_and_none_leaves_it_out() -> Non
 def test_the_command_line_adds_to_the_recipe() -> None:
     recipe = recipe_of_table({"preamp": {"declick": {"threshold": 7.0}, "rumble": {"poles": 2}}})
     more = with_repairs(recipe, declick=True, decrackle=True, rumble_hz=30.0)
-    assert more.repair == Repair(Declicker(threshold=7.0), Decrackler(), RumbleFilter(30.0))
+    assert more.repair == Repair(Declicker(threshold=7.0), Decrackler(), RumbleFilter(30.0, poles=2))
     assert with_repairs(recipe, declick=False, decrackle=False, rumble_hz=None) == recipe
 
 
@@ -98,3 +98,21 @@ def test_the_command_line_adds_to_the_recipe() -> None:
 def test_an_impossible_repair_is_named_with_its_table(table: dict[str, Any], said: str) -> None:
     with pytest.raises(ArgumentError, match=said):
         recipe_of_table({"preamp": table})
+
+
+def test_what_a_transfer_consists_of_stands_in_the_documents(mended: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "transfer-files.md").read_text(encoding="utf-8")
+    rows = " ".join(line.split("|")[1] for line in page.splitlines() if line.startswith("| `"))
+    for path in mended.iterdir():
+        name = "NAME.wav.sha256" if path.suffix == ".sha256" else path.name
+        assert f"`{name}`" in rows, name
+
+
+def test_the_terminal_tells_of_repairs_and_not_of_what_the_reading_bridged(
+    capture: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["play", str(capture), "--out", str(tmp_path / "out"), "--recipe", "seed-paper", "--rumble-hz", "25"]
+    assert main(command) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "repaired 1 span by rumble" in told
+    assert "by interpolated" not in told

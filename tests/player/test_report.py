@@ -91,8 +91,9 @@ def test_the_claimed_noise_is_of_the_size_of_the_error(film: Any, transfer: Any)
 
 def test_every_flag_is_explained_and_counted(transfer: Any) -> None:
     names = {str(flag.name).lower() for flag in Quality}
-    for key in ("flags", "flagged_samples", "flagged_pickup_samples"):
-        assert set(transfer.report[key]) == names
+    assert set(transfer.report["flags"]) == names
+    for key in ("flagged_samples", "flagged_pickup_samples"):
+        assert set(transfer.report[key]) == names - {"declicked", "decrackled"}, "a reading repairs nothing"
     assert transfer.report["flagged_samples"]["edge"] > 0
 
 

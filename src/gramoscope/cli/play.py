@@ -135,7 +135,16 @@ def play(
     catalogue = Catalogue(title=title, originator=originator, reference=reference, description=description)
     chosen = with_repairs(load_recipe(recipe), declick=declick, decrackle=decrackle, rumble_hz=rumble_hz)
     speed, where = Speed.chosen(rpm, speed_curve, remove_wow=remove_wow), device_named(device)
-    settings = Settings(float(rate), name, workers, full_scale_cm_s / 100, flac, catalogue, speed, where)
+    settings = Settings(
+        rate_hz=float(rate),
+        characteristic_name=name,
+        workers=workers,
+        full_scale_m_s=full_scale_cm_s / 100,
+        flac=flac,
+        catalogue=catalogue,
+        speed=speed,
+        device=where,
+    )
     with terminal.progress("Playing") as progress:
         report = play_capture(opened, chosen, out, settings, progress=progress)
     terminal.result(report)
@@ -170,22 +179,31 @@ def tell(terminal: Terminal, report: Mapping[str, Any], out: Path) -> None:
 
 
 def _names(report: Mapping[str, Any]) -> list[str]:
+    from gramoscope.player.transfer import cue_files_of
+
     sounds = [[name, *([file["flac"]["name"]] if "flac" in file else [])] for name, file in report["files"].items()]
-    cues = report["repair"]["cues"] if report["repair"] else {}
-    lists = [cues[which] for which in ("name", "labels") if which in cues]
-    return [*(name for names in sounds for name in names), *lists, "groove.png", "report.html", "report.json"]
+    return [
+        *(name for names in sounds for name in names),
+        *cue_files_of(report),
+        "groove.png",
+        "report.html",
+        "report.json",
+    ]
 
 
 def _repairs(report: Mapping[str, Any]) -> str:
     spans, seconds = report["repair"]["spans"], report["repair"]["seconds"]
-    told = [f"{several(number, 'span')} by {kind} ({seconds[kind] * 1e3:.1f} ms)" for kind, number in spans.items()]
+    repaired = {kind: number for kind, number in spans.items() if kind != "interpolated"}
+    told = [f"{several(number, 'span')} by {kind} ({seconds[kind] * 1e3:.1f} ms)" for kind, number in repaired.items()]
     return "; ".join(told) or "nothing was found"
 
 
 def _speed(speed: Mapping[str, Any]) -> str:
+    from gramoscope.player.speed import speed_in_words
+
     if speed["curve"] is not None:
-        return f"{min(speed['curve']['rpm']):g} to {max(speed['curve']['rpm']):g} rpm, as {speed['chosen']} says"
-    return f"{speed['rpm']:.5g} rpm" + (f"; the capture says {speed['capture_rpm']:g}" if speed["chosen"] else "")
+        return f"{speed_in_words(speed)}, as {speed['chosen']} says"
+    return speed_in_words(speed) + (f"; the capture says {speed['capture_rpm']:g}" if speed["chosen"] else "")
 
 
 def _groups(report: Mapping[str, Any]) -> str:

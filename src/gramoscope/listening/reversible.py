@@ -31,12 +31,16 @@ def reversible(raw: FloatArray, repaired: FloatArray, *, full_scale_m_s: float) 
     -------
     repaired, difference : float64 arrays, shape (sample,)
         Whole steps of full_scale_m_s / 2²³: a file takes them without rounding, and as whole numbers
-        repaired + difference = raw.
+        repaired + difference = raw. A repaired sample beyond full scale stays there, so that whoever writes it clips it to
+        the step that is meant, and counts it.
     """
     whole_raw, whole_repaired = (_steps(sound, full_scale_m_s) for sound in (raw, repaired))
     difference = np.clip(whole_raw - whole_repaired, -_STEPS, _STEPS - 1)
     step = full_scale_m_s / _STEPS
-    return (whole_raw - difference) * step, difference * step
+    left = whole_raw - difference
+    beyond = np.abs(np.nan_to_num(repaired, nan=0.0)) > full_scale_m_s
+    held = beyond & ((left == -_STEPS) | (left == _STEPS - 1))
+    return np.where(held, repaired, left * step), difference * step
 
 
 def _steps(sound: FloatArray, full_scale_m_s: float) -> FloatArray:

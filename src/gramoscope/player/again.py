@@ -21,6 +21,7 @@ from gramoscope.apparatus.manifest import MANIFEST_NAME
 from gramoscope.errors import ArgumentError, CaptureError, GramoscopeError, require
 from gramoscope.listening.broadcast_metadata import REFERENCE, ascii_text
 from gramoscope.player.catalogue import Catalogue
+from gramoscope.player.devices import device_of_report
 from gramoscope.player.provenance import InputHashes, versions
 from gramoscope.player.recipe import Recipe, recipe_of_table
 from gramoscope.player.report import REPORT_FORMAT
@@ -69,14 +70,15 @@ class Again:
         """Return the settings, with the moment of then; a capture with another name keeps the old one as its reference."""
         from gramoscope.player.play import Settings
 
-        known = {one.name for one in fields(Settings)} - {"catalogue", "workers"}
+        known = {one.name for one in fields(Settings)} - {"catalogue", "device", "workers"}
         unknown = sorted(set(self.report["settings"]) - known)
         require(not unknown, f"{self.path} has settings that are unknown here: {', '.join(unknown)}", "", _REMEDY)
         words = dict(self.report["catalogue"])
         if not words["reference"] and capture.folder.resolve().name != self.report["capture_name"]:
             words["reference"] = ascii_text(self.report["capture_name"])[:REFERENCE]
         catalogue = Catalogue(**words, made=datetime.fromisoformat(self.report["made"]))
-        return Settings(**self._chosen(get_type_hints(Settings)), catalogue=catalogue, workers=workers)
+        chosen = self._chosen(get_type_hints(Settings))
+        return Settings(**chosen, catalogue=catalogue, device=device_of_report(self.report["device"]), workers=workers)
 
     def _chosen(self, kinds: Mapping[str, Any]) -> dict[str, Any]:
         """Return the settings as they were, tables made into what they are tables of."""
@@ -171,7 +173,18 @@ def load_again(path: Path, *, force: bool = False) -> Again:
     return _looked_through(Again(path, report, force))
 
 
-_NEEDED = ("settings", "catalogue", "made", "capture", "capture_name", "recipe", "inputs", "files", "versions")
+_NEEDED = (
+    "settings",
+    "catalogue",
+    "made",
+    "capture",
+    "capture_name",
+    "recipe",
+    "inputs",
+    "files",
+    "versions",
+    "device",
+)
 
 
 def _looked_through(again: Again) -> Again:

@@ -6,7 +6,7 @@ from importlib.util import find_spec
 
 from gramoscope.errors import ArgumentError, require
 from gramoscope.pickup.device import Device
-from gramoscope.pickup.processor import Processor
+from gramoscope.pickup.processor import PROCESSOR
 
 DEVICES = ("cpu", "cuda")
 
@@ -24,7 +24,12 @@ def device_named(name: str) -> Device:
         If there is no such device, or no card that speaks CUDA, or nothing installed to speak to it.
     """
     require(name in DEVICES, f"device {name!r}", f"one of {', '.join(DEVICES)}")
-    return Processor() if name == "cpu" else _graphics_card()
+    return PROCESSOR if name == "cpu" else _graphics_card()
+
+
+def device_of_report(name: str) -> Device:
+    """Return the kind of device that a report names, as it is here; see `device_named`."""
+    return device_named(name.split(":")[0])
 
 
 def _graphics_card() -> Device:

@@ -16,12 +16,12 @@ class Hints:
 
     Parameters
     ----------
-    rpm : float
-        The speed at which it plays.
+    rpm : float or None
+        The speed at which it plays; None for one that changes, of which only the factor is told.
     rate_hz : float
     """
 
-    rpm: float
+    rpm: float | None
     rate_hz: float
 
     def __post_init__(self) -> None:
@@ -41,14 +41,17 @@ class Hints:
         if found.reason is not None:
             return {"line_hz": None, "reason": found.reason}
         relative = found.sigma_hz / found.line_hz
-        rpm = {mains: self.rpm * mains / found.line_hz for mains in found.mains_hz()}
-        turns = " or ".join(f"at {each:.2f} ± {each * relative:.2f} rpm ({mains:g} Hz)" for mains, each in rpm.items())
+        factors = {mains: mains / found.line_hz for mains in found.mains_hz()}
+        turns = " or ".join(f"{self._turning(each, relative)} ({mains:g} Hz)" for mains, each in factors.items())
         return {
             "line_hz": found.line_hz,
             "sigma_hz": found.sigma_hz,
             "harmonics": found.harmonics,
             "above_surroundings_db": found.above_surroundings_db,
-            "speeds": [{"mains_hz": mains, "rpm": each, "sigma_rpm": each * relative} for mains, each in rpm.items()],
+            "speeds": [
+                {"mains_hz": mains, "factor": each, "sigma_factor": each * relative, **self._rpm(each, relative)}
+                for mains, each in factors.items()
+            ],
             "words": (
                 f"a steady line at {found.line_hz:.2f} ± {found.sigma_hz:.2f} Hz; "
                 f"if it was mains hum, the record should turn {turns}"
@@ -56,19 +59,29 @@ class Hints:
             "reason": None,
         }
 
+    def _turning(self, factor: float, relative: float) -> str:
+        if self.rpm is None:
+            return f"{factor:.4f} ± {factor * relative:.4f} times as fast"
+        return f"at {self.rpm * factor:.2f} ± {self.rpm * factor * relative:.2f} rpm"
+
+    def _rpm(self, factor: float, relative: float) -> dict[str, float]:
+        return {} if self.rpm is None else {"rpm": self.rpm * factor, "sigma_rpm": self.rpm * factor * relative}
+
     def _of_tuning(self, found: TuningFinding) -> dict[str, Any]:
         if found.reason is not None:
             return {"cents": None, "reason": found.reason}
-        rpm = self.rpm / found.factor
+        factor = 1 / found.factor
+        turning = f"{factor:.4f} times as fast" if self.rpm is None else f"at {self.rpm * factor:.2f} rpm"
         return {
             "cents": found.cents,
             "sigma_cents": found.sigma_cents,
             "a_hz": found.a_hz,
             "partials": found.partials,
-            "rpm": rpm,
+            "factor": factor,
+            **({} if self.rpm is None else {"rpm": self.rpm * factor}),
             "words": (
                 f"tuned {found.cents:+.1f} ± {found.sigma_cents:.1f} cents from A = 440 Hz, an A of {found.a_hz:.1f} Hz; "
-                f"with an A of 440 the record should turn at {rpm:.2f} rpm"
+                f"with an A of 440 the record should turn {turning}"
             ),
             "reason": None,
         }

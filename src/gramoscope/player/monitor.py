@@ -11,7 +11,7 @@ import numpy as np
 from gramoscope.conventions import BoolArray, FloatArray
 from gramoscope.player.hints import Hints
 from gramoscope.player.quality_meter import QualityMeter
-from gramoscope.quality import NOT_MEASURED, Quality, count
+from gramoscope.quality import NOT_MEASURED, REPAIRS, Quality, count
 from gramoscope.signal_path import Audio, GrooveMotion, WallTrace
 from gramoscope.tonearm.splice import Match
 from gramoscope.turntable.hole_gauge import HoleGauge
@@ -219,4 +219,4 @@ def _with_group(problem: str, number: int) -> str:
     return problem if problem.startswith(f"group {number}") else f"group {number}, {problem}"
 
 
-_FLAG_NAMES = tuple(str(flag.name).lower() for flag in Quality)
+_FLAG_NAMES = tuple(str(flag.name).lower() for flag in Quality if flag not in REPAIRS)

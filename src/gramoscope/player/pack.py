@@ -19,6 +19,7 @@ from gramoscope.listening.whole_file import output_error, temporary_sibling
 from gramoscope.player.bag import BagFolder, removed, require_judge, require_valid
 from gramoscope.player.catalogue import record_in_words
 from gramoscope.player.outputs import REPORT
+from gramoscope.player.speed import speed_in_words
 from gramoscope.player.technical_metadata import csv_text, technical_metadata
 from gramoscope.player.transfer import Transfer, TransferFile, open_transfer
 
@@ -175,9 +176,10 @@ def _in_words(size_bytes: int) -> str:
 
 
 def _described(report: Mapping[str, Any]) -> str:
-    disc, rotation = report["bench"]["disc"], report["bench"]["rotation"]
+    disc = report["bench"]["disc"]
     words = record_in_words(report["catalogue"].get("title") or disc["notes"].get("title", ""), disc["notes"])
-    what = f"optical transfer of a gramophone record, {disc['cut']} cut, {rotation['rpm']:g} rpm, {report['seconds']:.3f} s"
+    speed = speed_in_words(report["speed"])
+    what = f"optical transfer of a gramophone record, {disc['cut']} cut, {speed}, {report['seconds']:.3f} s"
     return f"{words}; {what}" if words else what
 
 

@@ -10,7 +10,6 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -44,6 +43,7 @@ from gramoscope.player.tracks import (
     REPAIRED,
     VERTICAL,
     WALLS,
+    RepairedPiece,
     alone,
     left_of_repair,
     taken_by_repair,
@@ -57,6 +57,8 @@ from gramoscope.preamp.walls import WallSplitter, in_direction
 from gramoscope.signal_path import Audio, WallTrace
 from gramoscope.tonearm.follow import Tonearm
 from gramoscope.turntable.hole_gauge import HoleGauge
+from gramoscope.turntable.rotation import Rotation
+from gramoscope.turntable.speed_curve import DriftingRotation
 
 
 class Progress(Protocol):
@@ -239,10 +241,10 @@ def _repaired(pieces: Iterator[Audio], recipe: Recipe, files: Outputs, settings:
     if files.cues is None:
         yield from pieces
         return
-    left, taken = (partial(part, full_scale_m_s=settings.full_scale_m_s) for part in (left_of_repair, taken_by_repair))
-    pairs = files.kept(REPAIRED, recipe.repair.repair(pieces, files.cues.note), left)
-    for _, repaired in files.kept(DIFFERENCE, pairs, taken):
-        yield repaired
+    pairs = recipe.repair.repair(pieces, files.cues.note)
+    done = (RepairedPiece.of(raw, after, full_scale_m_s=settings.full_scale_m_s) for raw, after in pairs)
+    for piece in files.kept(DIFFERENCE, files.kept(REPAIRED, done, left_of_repair), taken_by_repair):
+        yield piece.sound
 
 
 def _outputs(capture: Capture, recipe: Recipe, folder: Path, settings: Settings) -> Outputs:
@@ -257,9 +259,13 @@ def _monitor(capture: Capture, tonearm: Tonearm, resampler: Resampler) -> Monito
     bench, rotation, rate_hz = capture.bench, resampler.rotation, resampler.rate_hz
     samples = float(rotation.time_of_arc_s(bench.passage_length_m)) * rate_hz
     quality = QualityMeter(tonearm, bench.disc.cut, rate_hz=rate_hz, passband=resampler.passband, samples=samples)
-    monitor = Monitor(HoleGauge(bench.rotation), Hints(rotation.rpm, rate_hz), quality)
+    monitor = Monitor(HoleGauge(bench.rotation), Hints(_steady_rpm(rotation), rate_hz), quality)
     monitor.overview.samples_per_point = max(1, int(np.ceil(samples / OVERVIEW_POINTS)))
     return monitor
+
+
+def _steady_rpm(rotation: Rotation) -> float | None:
+    return None if isinstance(rotation, DriftingRotation) else rotation.rpm
 
 
 def _require_sound(monitor: Monitor) -> None:

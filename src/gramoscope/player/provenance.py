@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import platform
 import sys
 from dataclasses import asdict, dataclass, field
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from os.path import relpath
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
@@ -20,17 +21,27 @@ if TYPE_CHECKING:
     from gramoscope.player.play import Settings
 
 _LIBRARIES = ("gramoscope", "numpy", "scipy", "numba", "llvmlite", "soxr", "soundfile", "tifffile", "zarr", "pillow")
-_NO_INFLUENCE = ("workers", "catalogue")
-"""Settings that stand elsewhere in the report, or that the result does not depend on."""
+_OPTIONAL = ("numba-cuda", "av")
+_NOT_AMONG_SETTINGS = ("workers", "catalogue", "device")
+"""The result does not depend on them, or they stand elsewhere in the report."""
 
 
 def versions() -> dict[str, str]:
     """Return the versions of everything that a result depends on."""
     return {
         **{name: version(name) for name in _LIBRARIES},
+        **_versions_of_those_installed(_OPTIONAL),
         "python": platform.python_version(),
         "system": f"{platform.system()} {platform.machine()}",
     }
+
+
+def _versions_of_those_installed(names: tuple[str, ...]) -> dict[str, str]:
+    found = {}
+    for name in names:
+        with contextlib.suppress(PackageNotFoundError):
+            found[name] = version(name)
+    return found
 
 
 def bench_of(capture: Capture) -> dict[str, Any]:
@@ -40,8 +51,8 @@ def bench_of(capture: Capture) -> dict[str, Any]:
 
 
 def settings_of(settings: Settings) -> dict[str, Any]:
-    """Return what the listener chose, beside the recipe and the catalogue, as far as the result depends on it."""
-    return {name: value for name, value in asdict(settings).items() if name not in _NO_INFLUENCE}
+    """Return what the listener chose beside recipe, catalogue and device, as far as the result depends on it."""
+    return {name: value for name, value in asdict(settings).items() if name not in _NOT_AMONG_SETTINGS}
 
 
 def from_folder(path: Path, folder: Path) -> str | None:

@@ -189,14 +189,14 @@ def _table_of_repair(repair: Repair) -> dict[str, Any]:
 
 
 def with_repairs(recipe: Recipe, *, declick: bool, decrackle: bool, rumble_hz: float | None) -> Recipe:
-    """Return the recipe with repairs added, where it has none of its own, as they come; ArgumentError for a bad corner."""
+    """Return the recipe with repairs added that it has not; a corner replaces its own. ArgumentError for a bad corner."""
     own = recipe.repair
     return replace(
         recipe,
         repair=Repair(
             declick=own.declick or (Declicker() if declick else None),
             decrackle=own.decrackle or (Decrackler() if decrackle else None),
-            rumble=own.rumble if rumble_hz is None else RumbleFilter(corner_hz=rumble_hz),
+            rumble=own.rumble if rumble_hz is None else replace(own.rumble or RumbleFilter(), corner_hz=rumble_hz),
         ),
     )
 

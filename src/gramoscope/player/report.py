@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gramoscope.apparatus.capture import Capture
+from gramoscope.disc.characteristics import FLAT as FLAT_CHARACTERISTIC
 from gramoscope.disc.characteristics import characteristic
 from gramoscope.disc.formats import direction_of_cut
 from gramoscope.pickup.cartridge import Pickup
@@ -78,7 +79,7 @@ def transfer_report(
         **seen,
         "response": response_of(settings.characteristic_name, rate_hz=settings.rate_hz),
         "files": {
-            **files,
+            **{name: {**file, "characteristic": FLAT_CHARACTERISTIC.name} for name, file in files.items()},
             EQUALISED.name: {**files[EQUALISED.name], **equalised},
         },
         "repair": repair,
@@ -112,9 +113,11 @@ def _remarks(capture: Capture, walls: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _clipped(files: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
-    for name, file in files.items():
-        if file["clipped_samples"]:
-            yield (
-                f"{name}: {file['clipped_samples']} samples beyond full scale ({100 * file['full_scale_m_s']:g} cm/s) were "
-                f"clipped; play again with --full-scale-cm-s {200 * file['full_scale_m_s']:g}"
-            )
+    clipped = {name: file["clipped_samples"] for name, file in files.items() if file["clipped_samples"]}
+    if clipped:
+        full_scale_cm_s = 100 * next(iter(files.values()))["full_scale_m_s"]
+        counts = ", ".join(f"{samples} in {name}" for name, samples in clipped.items())
+        yield (
+            f"samples beyond full scale ({full_scale_cm_s:g} cm/s) were clipped: {counts}; "
+            f"the scale to try next is --full-scale-cm-s {2 * full_scale_cm_s:g}"
+        )

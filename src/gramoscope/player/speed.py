@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
@@ -82,6 +83,13 @@ class Speed:
             "capture_rpm": nominal.rpm,
             "curve": curve,
         }
+
+
+def speed_in_words(speed: Mapping[str, Any]) -> str:
+    """Return the speed of a report in words: one number, or the lowest and the highest of a curve."""
+    if speed["curve"] is None:
+        return f"{speed['rpm']:.5g} rpm"
+    return f"{min(speed['curve']['rpm']):g} to {max(speed['curve']['rpm']):g} rpm"
 
 
 def load_speed_curve(path: Path) -> SpeedCurve:

@@ -12,7 +12,7 @@ import io
 from collections.abc import Mapping
 from typing import Any
 
-from gramoscope.disc.characteristics import FLAT, Characteristic, characteristic
+from gramoscope.disc.characteristics import Characteristic, characteristic
 from gramoscope.errors import ArgumentError
 from gramoscope.player.transfer import Transfer
 
@@ -21,7 +21,6 @@ FOUND, NOT_FOUND, NOT_ASSESSED = "found", "not found", "not assessed"
 _DIRECTIONS = {"lateral": "lateral", "vertical": "vertical", "stereo": "lateral and vertical (45/45)"}
 _ELSEWHERE = ("frame_lost", "dark", "saturated")
 _UNTOLD = {
-    "Crackle": "crackle is not told from the sound",
     "Cracks": "a crack is not told from a chip or from dust; where a wall was not seen is counted as groove damage",
     "Delamination": "the surface of the disc was not looked at",
     "Centre start disc": "a film does not tell where the record starts",
@@ -49,7 +48,7 @@ def technical_metadata(transfer: Transfer) -> dict[str, Any]:
     return {
         "format": PACKAGE_FORMAT,
         "bibliographic": {**disc["notes"], **({"title": title} if title else {})},
-        "playingSpeed": _measure(report["speed"]["rpm"], "rpm"),
+        **_speed(report["speed"]),
         "grooveSize": _measure(_rounded(1e6 * disc["groove_width_m"]), "µm"),
         "grooveDirection": _DIRECTIONS[disc["cut"]],
         "recordingMethod": "analogue",
@@ -64,6 +63,15 @@ def technical_metadata(transfer: Transfer) -> dict[str, Any]:
         "dateCreated": report["made"],
         "files": _files(report, sizes),
     }
+
+
+def _speed(speed: Mapping[str, Any]) -> dict[str, Any]:
+    """The speed at which the record turned; of one that changed the lowest and the highest beside that at the start."""
+    playing = {"playingSpeed": _measure(speed["rpm"], "rpm")}
+    if speed["curve"] is None:
+        return playing
+    low, high = min(speed["curve"]["rpm"]), max(speed["curve"]["rpm"])
+    return {**playing, "playingSpeedRange": {"lowest": low, "highest": high, "unit": "rpm"}}
 
 
 def _quality(share: Mapping[str, float], noise: Mapping[str, float | None]) -> dict[str, Any]:
@@ -82,13 +90,13 @@ def signal_notes(report: Mapping[str, Any]) -> list[dict[str, str]]:
         Of a transfer.
     """
     notes = [{"note": note, "status": NOT_ASSESSED, "basis": why} for note, why in _UNTOLD.items()]
-    return sorted([*notes, _groove_damage(report)], key=lambda note: note["note"])
+    return sorted([*notes, _groove_damage(report), _crackle(report["repair"])], key=lambda note: note["note"])
 
 
 def _groove_damage(report: Mapping[str, Any]) -> dict[str, str]:
     """Damage is where the stripes of the walls were not found; what else can be behind it is said."""
     flagged = report["flagged_samples"]
-    samples = max((file.get("samples", 0) for file in report["files"].values()), default=0)
+    samples = max(file["samples"] for file in report["files"].values())
     unseen = flagged["no_stripe"]
     lost = sum(flagged[name] for name in _ELSEWHERE)
     basis = f"the stripes of the walls were not found at {unseen} of {samples} samples (flag no_stripe)"
@@ -99,12 +107,20 @@ def _groove_damage(report: Mapping[str, Any]) -> dict[str, str]:
     return {"note": "Groove damage", "status": FOUND if unseen else NOT_FOUND, "basis": basis}
 
 
+def _crackle(repair: Mapping[str, Any] | None) -> dict[str, str]:
+    """Crackle is known where somebody asked for it to be taken off."""
+    if repair is None or not any("small pulses" in line for line in repair["history"]):
+        why = "crackle was not looked for: that is done by --decrackle alone"
+        return {"note": "Crackle", "status": NOT_ASSESSED, "basis": why}
+    spans, seconds = repair["spans"].get("decrackle", 0), repair["seconds"].get("decrackle", 0.0)
+    basis = f"decrackling took small pulses off at {spans} spans, {seconds:.3f} s in all (see cues.json)"
+    return {"note": "Crackle", "status": FOUND if spans else NOT_FOUND, "basis": basis}
+
+
 def _files(report: Mapping[str, Any], sizes: Mapping[str, int]) -> list[dict[str, Any]]:
     """An entry for each sound, FLAC too."""
     found = []
     for name, file in report["files"].items():
-        if "channels" not in file:
-            continue
         found.append(_sound(name, "Broadcast Wave", file, file["sha256"], report["rate_hz"], sizes))
         if "flac" in file:
             flac = file["flac"]
@@ -130,14 +146,14 @@ def _sound(
         "fullScale": _measure(file["full_scale_m_s"], "m/s"),
         "clippedSamples": file["clipped_samples"],
         "interpolatedSamples": file["interpolated_samples"],
+        "codingHistory": file["coding_history"],
+        **({"madeOf": f"data/{file['made_of']}"} if "made_of" in file else {}),
         **preamp,
     }
 
 
 def _curve(file: Mapping[str, Any]) -> Characteristic | None:
     """Return the characteristic that was undone; None where the report does not tell."""
-    if "characteristic" not in file:
-        return FLAT if any("not equalised" in line for line in file.get("coding_history", ())) else None
     try:
         return characteristic(file["characteristic"])
     except ArgumentError:

@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from gramoscope.player.play import Settings
     from gramoscope.player.recipe import Recipe
 
-Pair = tuple[Audio, Audio]
-"""A piece of sound as it came, and as it is after repair."""
-
 
 def _nothing(_: Settings, __: Recipe) -> str:
     return "not equalised; nothing repaired"
@@ -90,13 +87,34 @@ def vertical(piece: GrooveSound) -> tuple[Audio, ...]:
     return (piece.vertical,)
 
 
-def left_of_repair(pair: Pair, *, full_scale_m_s: float) -> tuple[Audio, ...]:
+@dataclass(frozen=True, eq=False)
+class RepairedPiece:
+    """A piece of sound after repair.
+
+    Attributes
+    ----------
+    sound : Audio
+        As it goes on.
+    left, taken : Audio
+        As files hold it: what is left, and what was taken off; both together are the raw sound, to the last bit.
+    """
+
+    sound: Audio
+    left: Audio
+    taken: Audio
+
+    @classmethod
+    def of(cls, raw: Audio, repaired: Audio, *, full_scale_m_s: float) -> RepairedPiece:
+        """Return a piece before and after repair as files of that scale hold it."""
+        left, taken = reversible(raw.samples, repaired.samples, full_scale_m_s=full_scale_m_s)
+        return cls(repaired, replace(repaired, samples=left), replace(repaired, samples=taken))
+
+
+def left_of_repair(piece: RepairedPiece) -> tuple[Audio, ...]:
     """Return the repaired sound as the one channel of a file."""
-    raw, repaired = pair
-    return (replace(repaired, samples=reversible(raw.samples, repaired.samples, full_scale_m_s=full_scale_m_s)[0]),)
+    return (piece.left,)
 
 
-def taken_by_repair(pair: Pair, *, full_scale_m_s: float) -> tuple[Audio, ...]:
+def taken_by_repair(piece: RepairedPiece) -> tuple[Audio, ...]:
     """Return what a repair took off as the one channel of a file."""
-    raw, repaired = pair
-    return (replace(repaired, samples=reversible(raw.samples, repaired.samples, full_scale_m_s=full_scale_m_s)[1]),)
+    return (piece.taken,)

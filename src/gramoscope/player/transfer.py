@@ -18,8 +18,8 @@ from gramoscope.player.track_file import sum_beside
 _TRANSFER = "a folder that `gramoscope play` wrote"
 _PLAY = "play the capture first: gramoscope play CAPTURE --out DIR"
 _NEEDED = (
-    *("made", "catalogue", "capture", "seconds", "rate_hz", "share", "flagged_samples", "noise_estimate"),
-    *("files", "bench", "versions"),
+    *("made", "catalogue", "capture", "seconds", "rate_hz", "speed", "share", "flagged_samples", "noise_estimate"),
+    *("files", "repair", "bench", "versions"),
 )
 _AGAIN = "play the capture again, or fetch the files from another copy"
 
@@ -141,13 +141,24 @@ def _sums(folder: Path, report: Mapping[str, Any], paths: Mapping[str, Path]) ->
     sums = {}
     for name, file in report["files"].items():
         flac = file.get("flac")
-        for each, digest in [(name, file.get("sha256")), *([(flac["name"], flac["sha256"])] if flac else [])]:
-            if each not in paths:
-                raise TransferError(f"there is no {each} in {folder}", f"every file that {REPORT} names", _AGAIN)
-            if digest:
-                _require_sum_beside(paths[each], digest)
-                sums[each] = digest
+        for each, digest in [(name, file["sha256"]), *([(flac["name"], flac["sha256"])] if flac else [])]:
+            _require_file(each, folder, paths)
+            _require_sum_beside(paths[each], digest)
+            sums[each] = digest
+    for name in cue_files_of(report):
+        _require_file(name, folder, paths)
     return sums
+
+
+def cue_files_of(report: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the names of the lists of what a repair touched; none where nothing was to be repaired."""
+    cues = report["repair"]["cues"] if report["repair"] else {}
+    return tuple(cues[which] for which in ("name", "labels") if which in cues)
+
+
+def _require_file(name: str, folder: Path, paths: Mapping[str, Path]) -> None:
+    if name not in paths:
+        raise TransferError(f"there is no {name} in {folder}", f"every file that {REPORT} names", _AGAIN)
 
 
 def _require_sum_beside(path: Path, digest: str) -> None:
