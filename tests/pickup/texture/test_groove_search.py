@@ -214,7 +214,7 @@ def test_the_energy_of_a_cell_is_that_of_the_frames_laid_over_each_other(dtype: 
     expected = square[:, :72].reshape(4, 9, CELL_PX).sum(axis=2).T
     energy = np.empty((9, 4), np.float32)
     total_room = np.empty(77, np.uint16 if dtype is np.uint8 else np.uint32)
-    cell_energy(images, np.array([0, 3, 7]), (1 / count).astype(np.float32), total_room, energy)
+    cell_energy(images, np.arange(3), np.array([0, 3, 7]), (1 / count).astype(np.float32), total_room, energy)
     np.testing.assert_allclose(energy, expected, rtol=1e-4)
     # uneven shifts count to whole pixels, and the last frame ends where the picture does
     assert sharpness(images, shift).shape == (9, 4)

@@ -12,12 +12,15 @@ import numba
 import numpy as np
 
 from gramoscope.conventions import Float32Array, FloatArray, IntArray
-from gramoscope.pickup.overlay import overlay_width
+from gramoscope.pickup.overlay import overlay_width, sum_type
 from gramoscope.signal_path import ImageArray
 
 CELL_PX = 8
 """Columns in a cell; `_sum_of_eight` adds so many."""
 CEILING = 1.5
+SOME_FRAMES = 6
+"""So many frames at most, the first and the last among them, show where the picture is sharp: most of what is uncertain is the
+texture, the same in all."""
 
 
 @numba.njit(cache=True, nogil=True)
@@ -48,14 +51,14 @@ def _sum_of_eight(values, cell):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def cell_energy(images, offset, share, total, energy):  # type: ignore[no-untyped-def]
-    """Write the energy of each cell of the mean of frames laid over each other by whole pixels; `total` has room for sums."""
-    frames, height, width = images.shape
+def cell_energy(images, frames, offset, share, total, energy):  # type: ignore[no-untyped-def]
+    """Write the energy of each cell of the mean of some frames, laid over each other by whole pixels, added up in `total`."""
+    _, height, width = images.shape
     mean, square = np.empty(total.size, np.float32), np.zeros(total.size, np.float32)
     for row in range(height):
         total[:] = 0
-        for k in range(frames):
-            _add_pixels(images[k, row], total[offset[k] : offset[k] + width])
+        for k in range(frames.size):
+            _add_pixels(images[frames[k], row], total[offset[k] : offset[k] + width])
         _scale(total, share, mean)
         _squares(mean[1:-5], mean[2:-4], mean[4:-2], mean[5:-1], square[3:-3])
         for cell in range(energy.shape[0]):
@@ -78,23 +81,22 @@ def sharpness(images: ImageArray, shift_px: FloatArray, *, ceiling: float = CEIL
     float32 array, shape (cell, row)
         Root of the energy above the noise, a little smoothed, in units of the sharpest row of a typical cell.
     """
-    offset, share = whole_pixels(images.shape[2], shift_px)
+    frames, offset, share = whole_pixels(images.shape[2], shift_px)
     width = share.size
     energy = np.empty((width // CELL_PX, images.shape[1]), np.float32)
-    small = images.dtype == np.uint8 and len(images) <= np.iinfo(np.uint16).max // np.iinfo(np.uint8).max
-    total = np.empty(width, np.uint16 if small else np.uint32)
-    cell_energy(images, offset, share, total, energy)
+    cell_energy(images, frames, offset, share, np.empty(width, sum_type(images)), energy)
     return sharpness_of(energy, ceiling=ceiling)
 
 
-def whole_pixels(frame_width: int, shift_px: FloatArray) -> tuple[IntArray, Float32Array]:
-    """Return where the frames begin, laid over each other by whole pixels, and one over how many lie in each column."""
+def whole_pixels(frame_width: int, shift_px: FloatArray) -> tuple[IntArray, IntArray, Float32Array]:
+    """Return which frames are looked at, where each begins, by whole pixels, and one over how many lie in each column."""
     width = overlay_width(frame_width, shift_px)
-    offset = np.minimum(np.rint(shift_px).astype(np.int64), width - frame_width)
+    frames = np.unique(np.rint(np.linspace(0, shift_px.size - 1, min(SOME_FRAMES, shift_px.size))).astype(np.int64))
+    offset = np.minimum(np.rint(shift_px).astype(np.int64), width - frame_width)[frames]
     counts = np.zeros(width)
     for first in offset:
         counts[first : first + frame_width] += 1
-    return offset, (1 / np.maximum(counts, 1)).astype(np.float32)
+    return frames, offset, (1 / np.maximum(counts, 1)).astype(np.float32)
 
 
 def sharpness_of(energy: Float32Array, *, ceiling: float = CEILING) -> Float32Array:
