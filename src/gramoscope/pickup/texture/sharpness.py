@@ -54,7 +54,9 @@ def _sums_of_eight(v, sums):  # type: ignore[no-untyped-def]
     for cell in range(np.uint64(sums.size)):
         a = cell * np.uint64(CELL_PX)
         b = a + four
-        sums[cell] = ((v[a] + v[b]) + (v[a + one] + v[b + one])) + ((v[a + two] + v[b + two]) + (v[a + three] + v[b + three]))
+        sums[cell] = ((v[a] + v[b]) + (v[a + one] + v[b + one])) + (
+            (v[a + two] + v[b + two]) + (v[a + three] + v[b + three])
+        )
 
 
 @numba.njit(cache=True, nogil=True)
