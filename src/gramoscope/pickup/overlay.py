@@ -255,8 +255,11 @@ def to_phases(shift_px: FloatArray) -> FloatArray:
     """Return shifts that differ by eighths of a pixel, and from what they were by nothing in the mean.
 
     Frames with the same fraction of a pixel are laid over each other as whole numbers by `overlay`. The mean counts: it is
-    where the groove is believed to be along itself, and a group that is off by a tenth of a pixel is heard.
+    where the groove is believed to be along itself, and a group that is off by a tenth of a pixel is heard. No more frames
+    than there are phases stay as they are: nothing would be saved, and the errors of few do not average out.
     """
+    if shift_px.size <= PHASES:
+        return shift_px
     near: FloatArray = np.rint(PHASES * shift_px) / PHASES
     # the same fractions to the last bit
     return near + np.rint((shift_px - near).mean() * 2**20) / 2**20
