@@ -87,10 +87,11 @@ class Capture:
         """
         require(0 <= number < self.group_count, f"group {number}", f"0 … {self.group_count - 1}")
         sequence, sensor = self.bench.sequence, self.bench.sensor
-        images = np.zeros((sequence.frames_per_group, sensor.height_px, sensor.width_px), sensor.dtype)
+        images: ImageArray = np.empty((sequence.frames_per_group, sensor.height_px, sensor.width_px), sensor.dtype)
         valid = np.zeros(sequence.frames_per_group, np.bool_)
         remarks = _Remarks()
         self._read_into(images, valid, remarks, number=number)
+        images[~valid] = 0
         arc_start_m, stage_m = self._places(number, remarks)
         return FrameGroup(
             number=number,

@@ -108,7 +108,7 @@ def _page(tiff: tifffile.TiffFile, index: int, *, path: Path, sensor: Sensor) ->
     if (key.imagewidth, key.imagelength) != (sensor.width_px, sensor.height_px):
         raise ValueError(wrong_size(key.imagewidth, key.imagelength, sensor=sensor))
     try:
-        frame: Frame = page.asarray()
+        frame: Frame = _as_it_lies(tiff, page) if page.is_final else page.asarray()
     except ValueError as error:
         if "imagecodecs" not in str(error):
             raise
@@ -116,6 +116,15 @@ def _page(tiff: tifffile.TiffFile, index: int, *, path: Path, sensor: Sensor) ->
     if key.photometric == _WHITE_IS_ZERO:
         frame = np.asarray(2**key.bitspersample - 1 - frame, frame.dtype)
     return np.moveaxis(frame, 0, -1) if frame.ndim == 3 and key.planarconfig == _PLANAR else frame
+
+
+def _as_it_lies(tiff: tifffile.TiffFile, page: Any) -> Frame:
+    """Return a page that is stored as an array, read without a detour."""
+    frame = np.empty(page.shape, tiff.byteorder + page.dtype.char)
+    tiff.filehandle.seek(page.dataoffsets[0])
+    if tiff.filehandle.readinto(frame) != frame.nbytes:
+        raise ValueError("the file ends within a page")
+    return frame.astype(page.dtype, copy=False)
 
 
 def _page_by_pillow(path: Path, index: int) -> Frame:
