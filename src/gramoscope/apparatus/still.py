@@ -81,7 +81,8 @@ class StillCapture:
         stored = _read(self.folder / self.manifest.pictures[number], folder=self.folder)
         if isinstance(stored, Lost):
             image = np.zeros((bench.sensor.height_px, bench.sensor.width_px), bench.sensor.dtype)
-            problems, seen = (stored.why,), np.zeros(image.shape, np.bool_)
+            problems: tuple[str, ...] = (stored.why,)
+            seen = np.zeros(image.shape, np.bool_)
         else:
             image, problems = _canonical(stored, bench)
             seen = np.ones(image.shape, np.bool_)
