@@ -106,13 +106,15 @@ class StillCapture:
         return (self.folder / MANIFEST_NAME,) if self.path == self.folder else ()
 
 
-def open_stills(folder: str | Path) -> StillCapture:
+def open_stills(folder: str | Path, *, rpm: float | None = None) -> StillCapture:
     """Open a folder of photographs.
 
     Parameters
     ----------
     folder : path
         Where its `capture.toml` lies.
+    rpm : float, optional
+        Its speed, where `capture.toml` does not tell.
 
     Returns
     -------
@@ -129,6 +131,7 @@ def open_stills(folder: str | Path) -> StillCapture:
     """
     folder = Path(folder)
     manifest = read_still_manifest(folder)
+    manifest = replace(manifest, rpm=rpm) if manifest.rpm is None else manifest
     for name in manifest.pictures:
         if not is_inside(folder / name, folder):
             raise ManifestError(

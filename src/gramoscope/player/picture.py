@@ -7,15 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from gramoscope.apparatus.capture import Capture
+from gramoscope.apparatus.bench import Bench
 from gramoscope.conventions import BoolArray, FloatArray
 from gramoscope.listening.figures import frame_figure, groove_figure
-from gramoscope.pickup.cartridge import Pickup, Sketch
+from gramoscope.pickup.cartridge import Sketch
 from gramoscope.player.monitor import Monitor
+from gramoscope.player.reading import AnyCapture, Reading
 from gramoscope.player.worst_groups import Doubtful
 
 TRIED_GROUPS = 8
 WORST_PLACES = 3
+_GROUP = ("group", "picture")
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,11 +28,11 @@ class Place:
     figure: Figure
 
 
-def worst_places(capture: Capture, pickup: Pickup, monitor: Monitor) -> list[Place]:
+def worst_places(capture: AnyCapture, reading: Reading, monitor: Monitor) -> list[Place]:
     """Draw the worst groups of a transfer of which at least one frame is left, the worst first."""
     sensor, places = capture.bench.sensor, list[Place]()
     for group in monitor.quality.worst.worst_first() if monitor.quality is not None else ():
-        sketch = pickup.sketch(capture.group(group.number)) if len(places) < WORST_PLACES else None
+        sketch = reading.sketch(group.number) if len(places) < WORST_PLACES else None
         if sketch is not None:
             figure = frame_figure(
                 sketch.image,
@@ -42,9 +44,11 @@ def worst_places(capture: Capture, pickup: Pickup, monitor: Monitor) -> list[Pla
     return places
 
 
-def groove_picture(capture: Capture, pickup: Pickup, monitor: Monitor, *, rate_hz: float, recipe_name: str) -> Figure:
+def groove_picture(
+    capture: AnyCapture, reading: Reading, monitor: Monitor, *, rate_hz: float, recipe_name: str
+) -> Figure:
     """Draw a frame from the middle of the passage with what the pickup saw, and the sound of the whole."""
-    number, sketch = _telling_group(capture, pickup)
+    number, sketch = _telling_group(capture, reading)
     bench = capture.bench
     if sketch is None:
         sketch = Sketch(np.zeros((bench.sensor.height_px, bench.sensor.width_px), np.uint8), ())
@@ -53,9 +57,9 @@ def groove_picture(capture: Capture, pickup: Pickup, monitor: Monitor, *, rate_h
         white_level=bench.sensor.white_level,
         pixel_pitch_m=bench.sensor.pixel_pitch_m,
         stripes=_stripes(sketch),
-        glass_edge_row=bench.glass_edge_row if bench.cover_glass else None,
+        glass_edge_row=bench.glass_edge_row if isinstance(bench, Bench) and bench.cover_glass else None,
         waveform=monitor.overview.waveform(rate_hz),
-        title=f"{capture.folder.name}: group {number} of {capture.group_count}, read by “{recipe_name}”",
+        title=f"{capture.name}: {_GROUP[capture.layout == 'stills']} {number} of {capture.group_count}, read by “{recipe_name}”",
     )
 
 
@@ -64,11 +68,11 @@ def _stripes(sketch: Sketch) -> list[tuple[str, FloatArray, FloatArray, BoolArra
     return [(line.name, columns, line.row, line.measured) for line in sketch.lines]
 
 
-def _telling_group(capture: Capture, pickup: Pickup) -> tuple[int, Sketch | None]:
+def _telling_group(capture: AnyCapture, reading: Reading) -> tuple[int, Sketch | None]:
     """The middle group, or the nearest of a few after it of which something is left."""
     middle = capture.group_count // 2
     for number in range(middle, min(middle + TRIED_GROUPS, capture.group_count)):
-        sketch = pickup.sketch(capture.group(number))
+        sketch = reading.sketch(number)
         if sketch is not None:
             return number, sketch
     return middle, None

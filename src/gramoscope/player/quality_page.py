@@ -216,12 +216,14 @@ def _walls(report: Report) -> str:
 
 
 def _speed(report: Report) -> str:
-    step, places, stated = report["frame_step"], report["group_positions"], report["bench"]["sequence"]
+    step, places = report["frame_step"], report["group_positions"]
     found = number(step["measured_mean_um"], "µm", digits=4)
     spread, away = (_nanometres(um) for um in (step["measured_spread_um"], places["rms_error_of_the_nominal_step_um"]))
-    nominal = number(1e6 * stated["frame_step_m"], "µm", digits=4)
+    film = report["bench"].get("sequence")
+    stated = [] if film is None else [f"stated {number(1e6 * film['frame_step_m'], 'µm', digits=4)}"]
+    steps = "; ".join([f"{found} ± {spread} by {step['steps_measured']} pairs", *stated])
     rows = [
-        ("step from frame to frame", f"{found} ± {spread} by {step['steps_measured']} pairs; stated {nominal}"),
+        *([("step from frame to frame", steps)] if film is not None else []),
         ("overlaps of groups matched", f"{places['overlaps_matched']}; {places['overlaps_not_matched']} not"),
         ("error of the stated group step", f"{away} rms"),
         *_speed_rows(report),
