@@ -29,6 +29,8 @@ BoolArray = npt.NDArray[np.bool_]
 
 STRIPE_COLOURS = (ink.ORANGE, ink.SKY, ink.YELLOW, ink.PURPLE)
 FILLED_IN = (0, (4, 3))
+TALLEST_IN = 9.0
+"""Pictures that would be taller are drawn narrower."""
 LONGEST_LINE = 135
 """Letters of stripes' names that fit side by side."""
 
@@ -112,7 +114,7 @@ def groove_figure(
     require(image.ndim == 2, f"an image of shape {image.shape}", "shape (row, column)")
     sound = Waveform(*waveform)
     require(len({len(part) for part in sound}) == 1, "a waveform whose parts differ in length", "equal lengths")
-    height_in = 10.5 * image.shape[0] / image.shape[1]
+    height_in = min(10.5 * image.shape[0] / image.shape[1], TALLEST_IN)
     figure = ink.blank_figure(11.0, height_in + 5.2)
     figure.suptitle(title, x=0.012, ha="left", fontsize=ink.LARGE, color=ink.BLACK)
     above, below = figure.subplots(2, 1, height_ratios=[height_in, 3.0])
@@ -188,6 +190,7 @@ def _draw_stripe(axes: Axes, line: StripeLine, *, colour: str, height_px: int, p
 def _name_stripes(axes: Axes, names: Sequence[str]) -> None:
     """Write the heading, and below it which line is which; long names stand in two columns."""
     heading = "One frame, and the stripes found in it"
+    names = [name for name in names if not name.startswith("_")]
     if not names:
         ink.heading(axes, heading)
         return

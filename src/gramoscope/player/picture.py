@@ -17,7 +17,6 @@ from gramoscope.player.worst_groups import Doubtful
 
 TRIED_GROUPS = 8
 WORST_PLACES = 3
-_GROUP = ("group", "picture")
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +49,7 @@ def groove_picture(
     """Draw a frame from the middle of the passage with what the pickup saw, and the sound of the whole."""
     number, sketch = _telling_group(capture, reading)
     bench = capture.bench
+    which = "picture" if capture.layout == "stills" else "group"
     if sketch is None:
         sketch = Sketch(np.zeros((bench.sensor.height_px, bench.sensor.width_px), np.uint8), ())
     return groove_figure(
@@ -59,7 +59,7 @@ def groove_picture(
         stripes=_stripes(sketch),
         glass_edge_row=bench.glass_edge_row if isinstance(bench, Bench) and bench.cover_glass else None,
         waveform=monitor.overview.waveform(rate_hz),
-        title=f"{capture.name}: {_GROUP[capture.layout == 'stills']} {number} of {capture.group_count}, read by “{recipe_name}”",
+        title=f"{capture.name}: {which} {number} of {capture.group_count}, read by “{recipe_name}”",
     )
 
 

@@ -51,7 +51,8 @@ def bench_of(capture: AnyCapture) -> dict[str, Any]:
 
 def settings_of(settings: Settings) -> dict[str, Any]:
     """Return what the listener chose beside recipe, catalogue and device, as far as the result depends on it."""
-    return {name: value for name, value in asdict(settings).items() if name not in _NOT_AMONG_SETTINGS}
+    left_out = {*_NOT_AMONG_SETTINGS, *([] if settings.groove is not None else ["groove"])}
+    return {name: value for name, value in asdict(settings).items() if name not in left_out}
 
 
 def from_folder(path: Path, folder: Path) -> str | None:

@@ -202,7 +202,7 @@ class RowOfPictures:
         pitch_m, turn_px = self.bench.sensor.pixel_pitch_m, self.bench.row.turn_px or 0.0
         arc_m, lateral_m = self._place_m
         start = _moved(self._first.head, turn_px * pitch_m, 0.0)
-        end = _moved(last.closing, arc_m + last.closing_first * pitch_m, lateral_m, absolute=True)
+        end = _moved(last.closing, arc_m - last.number * self.bench.row.step_px * pitch_m, lateral_m)
         self.turn_match = self.stitch.match(end, start)
         if np.isnan(self.turn_match.error_m):
             self.problems.append(
@@ -259,6 +259,5 @@ def _shifted(stretch: Stretch, arc_m: float, lateral_m: float) -> Stretch:
     )
 
 
-def _moved(texture: Texture, arc_m: float, lateral_m: float, *, absolute: bool = False) -> Texture:
-    start_m = arc_m if absolute else texture.arc_start_m + arc_m
-    return Texture(texture.strip, start_m, texture.pixel_pitch_m, lateral_m)
+def _moved(texture: Texture, arc_m: float, lateral_m: float) -> Texture:
+    return Texture(texture.strip, texture.arc_start_m + arc_m, texture.pixel_pitch_m, lateral_m)

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from gramoscope.player.play import Settings
     from gramoscope.player.recipe import Recipe
 
-SILENCE_S = 0.01
+SILENCE_S = 0.002
 """Between two grooves that do not join."""
 GROOVE_COLUMNS = ("groove", "start_s", "stop_s", "length_mm", "turns", "first_picture", "last_picture", "measured")
 

@@ -55,12 +55,13 @@ class Stitch:
         ----------
         picture : StillPicture
         start, stop : int
-            Columns; those outside the picture are left out.
+            Columns; those outside the picture, and the outermost few inside it, whose derivative is not known, are left out.
         """
-        start, stop = max(start, 0), min(stop, picture.image.shape[1])
-        first, last = max(start - MARGIN_PX, 0), min(stop + MARGIN_PX, picture.image.shape[1])
+        columns = picture.image.shape[1]
+        start, stop = max(start, MARGIN_PX), min(stop, columns - MARGIN_PX)
+        first, last = start - MARGIN_PX, min(stop + MARGIN_PX, columns)
         return Texture(
-            strip=_derivative(picture, first, last)[:, start - first : max(stop - first, 0)],
+            strip=_derivative(picture, first, last)[:, MARGIN_PX : max(stop - first, MARGIN_PX)],
             arc_start_m=picture.arc_start_m + start * picture.pixel_pitch_m,
             pixel_pitch_m=picture.pixel_pitch_m,
             stage_m=picture.lateral_start_m,
