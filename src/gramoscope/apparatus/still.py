@@ -78,7 +78,7 @@ class StillCapture:
         """
         require(0 <= number < self.group_count, f"picture {number}", f"0 … {self.group_count - 1}")
         bench = self.bench
-        stored = _read(self.folder / self.manifest.pictures[number], folder=self.folder)
+        stored = read_photograph(self.folder / self.manifest.pictures[number], folder=self.folder)
         if isinstance(stored, Lost):
             image = np.zeros((bench.sensor.height_px, bench.sensor.width_px), bench.sensor.dtype)
             problems: tuple[str, ...] = (stored.why,)
@@ -221,7 +221,7 @@ def _require_a_turn(bench: StillBench) -> None:
 def _first_readable(folder: Path, manifest: StillManifest) -> Frame:
     whys = []
     for name in manifest.pictures:
-        stored = _read(folder / name, folder=folder)
+        stored = read_photograph(folder / name, folder=folder)
         if not isinstance(stored, Lost):
             return stored
         whys.append(stored.why)
@@ -232,7 +232,8 @@ def _first_readable(folder: Path, manifest: StillManifest) -> Frame:
     )
 
 
-def _read(path: Path, *, folder: Path) -> Frame | Lost:
+def read_photograph(path: Path, *, folder: Path) -> Frame | Lost:
+    """Read a picture as it was stored, or say why it is of no use; it must not lie outside the folder."""
     if not is_inside(path, folder):
         return Lost(f"{path.name} lies outside the folder of the capture and was not opened")
     stored = read_first_page(path) if path.suffix.lower() in TIFF_SUFFIXES else read_picture(path)

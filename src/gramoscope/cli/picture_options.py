@@ -26,7 +26,7 @@ class PictureOptions:
     radius_mm
         Of a picture: radius of its grooves. When nobody knows, 115 mm.
     groove_along
-        Of a picture: columns if grooves run from side to side, rows if they run up and down. Found in the picture when left out.
+        Of a picture: columns if grooves run from side to side, rows if they run up and down. Found by itself when left out.
     along
         Of a picture: forward if the groove plays from left to right, or from top to bottom.
     across

@@ -49,7 +49,8 @@ def groove_picture(
     """Draw a frame from the middle of the passage with what the pickup saw, and the sound of the whole."""
     number, sketch = _telling_group(capture, reading)
     bench = capture.bench
-    which = "picture" if capture.layout == "stills" else "group"
+    stills = capture.layout == "stills"
+    which, lines = ("picture", "edges") if stills else ("group", "stripes")
     if sketch is None:
         sketch = Sketch(np.zeros((bench.sensor.height_px, bench.sensor.width_px), np.uint8), ())
     return groove_figure(
@@ -60,6 +61,7 @@ def groove_picture(
         glass_edge_row=bench.glass_edge_row if isinstance(bench, Bench) and bench.cover_glass else None,
         waveform=monitor.overview.waveform(rate_hz),
         title=f"{capture.name}: {which} {number} of {capture.group_count}, read by “{recipe_name}”",
+        heading=f"One {'picture' if stills else 'frame'}, and the {lines} found in it",
     )
 
 

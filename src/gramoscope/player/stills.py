@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from gramoscope.player.play import Settings
     from gramoscope.player.recipe import Recipe
 
+SHOWN_PX = 2048
+"""Columns of a picture that are drawn."""
 SILENCE_S = 0.002
 """Between two grooves that do not join."""
 GROOVE_COLUMNS = ("groove", "start_s", "stop_s", "length_mm", "turns", "first_picture", "last_picture", "measured")
@@ -209,18 +211,20 @@ class StillReading:
         groove.start_s, groove.stop_s = start_sample / self.rate_hz, stop_sample / self.rate_hz
 
     def sketch(self, number: int) -> Sketch | None:
-        """Return a picture and the edges that were found in it; None where there are none."""
+        """Return the middle of a picture and the edges that were found in it; None where there are none."""
         if not self.found.get(number):
             return None
-        lines = []
+        image, lines = self.capture.group(number).image, []
+        first = max(image.shape[1] - SHOWN_PX, 0) // 2
+        shown = slice(first, first + SHOWN_PX)
         for groove in range(self.found[number]):
             edges = read_edges(self.edges_path, number, groove)
             measured = np.isfinite(edges.row_px) & ((edges.flags & np.uint16(NOT_MEASURED)) == 0)
             for wall, name in enumerate(("inner edge", "outer edge")):
                 # the legend names one groove for all
                 label = name if groove == 0 else f"_{name} of groove {groove + 1}"
-                lines.append(Line(label, edges.row_px[wall], measured[wall]))
-        return Sketch(self.capture.group(number).image, tuple(lines))
+                lines.append(Line(label, edges.row_px[wall][shown], measured[wall][shown]))
+        return Sketch(image[:, shown], tuple(lines))
 
     def as_dict(self) -> dict[str, Any]:
         """Write the table of grooves and their labels, and return what the report says of them."""

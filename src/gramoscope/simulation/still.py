@@ -10,12 +10,12 @@ noise come on top. What lies beyond a turn is shown once more, with noise of its
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import gaussian_filter, map_coordinates
 from scipy.special import ndtr
 
 from gramoscope.apparatus.manifest import MANIFEST_NAME
@@ -264,3 +264,37 @@ def still_truth_m_s(scene: StillScene, passage: Passage, *, rate_hz: float) -> F
     """Return lateral and vertical velocity of the groove in the turns with sound, shape (2, sample); sample 0 is s = 0."""
     time_s = np.arange(int(scene.seconds * rate_hz)) / rate_hz
     return passage.velocity_m_s(scene.rotation.arc_of_time_m(time_s))
+
+
+def disc_picture(
+    scene: StillScene,
+    passage: Passage,
+    *,
+    centre_px: tuple[float, float],
+    size_px: tuple[int, int],
+    squeeze: float = 1.0,
+) -> Picture:
+    """Return a photograph of the whole disc, as one looks down on it: the still rolled up again.
+
+    Parameters
+    ----------
+    scene : StillScene
+        Its row 0 lies at the radius of `rotation`.
+    passage : Passage
+    centre_px : (float, float)
+        Row and column of the centre.
+    size_px : (int, int)
+        Rows and columns of the picture.
+    squeeze : float
+        Height of a pixel over its width.
+    """
+    flat = still_picture(replace(scene, noise=0.0, overlap_px=16), passage)
+    rows, columns = np.indices(size_px, np.float64)
+    up, right = squeeze * (centre_px[0] - rows), columns - centre_px[1]
+    angle_px = np.arctan2(up, right) / (2 * np.pi) % 1 * scene.turn_px
+    row = scene.turn_px / (2 * np.pi) - np.hypot(up, right)
+    light = map_coordinates(
+        flat, np.stack([row, angle_px]), order=3, mode="constant", cval=255 * scene.land, output=np.float64
+    )
+    noise = np.random.default_rng([scene.seed, NOISE_STREAM]).standard_normal(light.shape)
+    return np.clip(np.rint(light + scene.noise * noise), 0, 255).astype(np.uint8)
