@@ -39,6 +39,8 @@ def in_a_row(
         start = done + silence
         for piece in passage:
             if silence:
+                if not piece.lateral.samples.size:
+                    continue
                 yield _silence(piece, done, silence)
                 silence = 0
             yield _later(piece, start)
