@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -16,7 +18,7 @@ RATE_HZ = 8000.0
 def passage(length: int, level: float, cuts: tuple[int, ...] = ()) -> list[GrooveSound]:
     audio = Audio(0, RATE_HZ, level + np.arange(length, dtype=np.float64), np.ones(length), no_flags(length), ("h",))
     edges = (0, *cuts, length)
-    parts = [part_of(audio, start, stop) for start, stop in zip(edges, edges[1:], strict=False)]
+    parts = [part_of(audio, start, stop) for start, stop in pairwise(edges)]
     return [GrooveSound(part, part) for part in parts]
 
 

@@ -7,12 +7,13 @@ rays: the grooves of neighbouring sectors are shifted against each other by what
     d(θ) = x cos θ + y sin θ + c cos 2θ + s sin 2θ − p θ/2π,
 
 x and y being how far the centre lies to the right and above, c and s an ellipse (pixels that are not square), and p the pitch
-of the spiral. Each sector
-of the disc is correlated with the next; the differences add up round the disc and are fitted.
+of the spiral. At first each sector of the disc is correlated with the next, which works however far off the start is; then
+each with the mean of all along the spiral, so that errors do not add up round the disc.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,11 +32,11 @@ SECTOR_PX = 8.0
 MOST_SECTORS = 4096
 RAYS = 4
 REACH_PX = 4
-ROUNDS = 4
+ROUNDS = 2
 BAND_RAYS = 512
 BAND_SHARE = 0.2
 """Of the ring's usual power."""
-SETTLED_PX = 0.005
+STEP_PX = 0.5
 FIRM_PX = 1.0
 """Shifts from sector to sector that are larger pull less: a scratch, or a groove taken for its neighbour."""
 
@@ -127,14 +128,25 @@ def refined_centre(image: ImageArray, start: tuple[float, float], *, inner_px: f
     mean = (inner_px + outer_px) / 2
     centre = DiscCentre(start[0], start[1], mean_radius_px=mean)
     for _ in range(ROUNDS):
-        fitted, sigma = _fit(_sector_shifts(image, centre, inner_px, outer_px))
-        x, y, c, s, pitch = (float(one) for one in fitted)
-        centre = DiscCentre(
-            centre.row_px - y, centre.column_px + x, centre.cos2_px + c, centre.sin2_px + s, mean, -pitch, sigma
-        )
-        if max(abs(x), abs(y)) < SETTLED_PX:
-            break
+        profiles = _profiles(image, centre, inner_px, outer_px)
+        centre = _put_right(centre, *_fit(_from_neighbours(profiles), _changes))
+    for _ in range(ROUNDS):
+        profiles = _profiles(image, centre, inner_px, outer_px)
+        centre = _put_right(centre, *_fit(_from_the_mean(profiles), _courses))
     return centre
+
+
+def _put_right(centre: DiscCentre, fitted: FloatArray, sigma: float) -> DiscCentre:
+    right, up, c, s, slope = (float(one) for one in fitted[:5])
+    return DiscCentre(
+        centre.row_px - up,
+        centre.column_px + right,
+        centre.cos2_px + c,
+        centre.sin2_px + s,
+        centre.mean_radius_px,
+        centre.pitch_px - slope,
+        sigma,
+    )
 
 
 def groove_band(image: ImageArray, centre: DiscCentre) -> tuple[float, float]:
@@ -162,16 +174,28 @@ def groove_band(image: ImageArray, centre: DiscCentre) -> tuple[float, float]:
     return float(radius[first]), float(radius[min(stop, radius.size - 1)])
 
 
-def _sector_shifts(image: ImageArray, centre: DiscCentre, inner_px: float, outer_px: float) -> FloatArray:
-    """How much farther out the grooves of each sector lie than those of the one before, in pixels; NaN where it is not seen."""
-    radius = np.arange(inner_px, outer_px, 0.5)
+def _profiles(image: ImageArray, centre: DiscCentre, inner_px: float, outer_px: float) -> FloatArray:
+    """What is seen along the radius in each sector, every half pixel, following the spiral as far as it is known."""
     sectors = min(int(2 * np.pi * centre.mean_radius_px / SECTOR_PX), MOST_SECTORS)
+    radius = np.arange(inner_px, outer_px, STEP_PX)
     profiles = np.empty((sectors, radius.size))
     for sector in range(sectors):
         angle = 2 * np.pi * (sector + (np.arange(RAYS) / RAYS - 0.5)[:, None]) / sectors
-        profiles[sector] = _seen_at(image, centre, angle, radius).mean(axis=0)
-    profiles -= gaussian_filter(profiles, (0, 16.0))
-    return np.array([0.5 * _shift(profiles[k - 1], profiles[k]) for k in range(sectors)])
+        inwards = centre.pitch_px * (sector / sectors - 0.5)
+        profiles[sector] = _seen_at(image, centre, angle, radius - inwards).mean(axis=0)
+    return np.asarray(profiles - gaussian_filter(profiles, (0, 16.0)), np.float64)
+
+
+def _from_neighbours(profiles: FloatArray) -> FloatArray:
+    """How much farther out the grooves of each sector lie than those of the one before, in pixels; NaN where it is not seen."""
+    # the first sector follows the last one of the turn before, which is a pitch away
+    return np.array([np.nan, *(STEP_PX * _shift(profiles[k - 1], profiles[k]) for k in range(1, len(profiles)))])
+
+
+def _from_the_mean(profiles: FloatArray) -> FloatArray:
+    """How much farther out the grooves of each sector lie than they do on the whole, in pixels."""
+    mean = profiles.mean(axis=0)
+    return np.array([STEP_PX * _shift(mean, profile) for profile in profiles])
 
 
 def _seen_at(image: ImageArray, centre: DiscCentre, angle_rad: FloatArray, radius_px: FloatArray) -> FloatArray:
@@ -191,28 +215,33 @@ def _shift(before: FloatArray, after: FloatArray) -> float:
     return float(best - reach + 0.5 * (left - right) / (left - 2 * peak + right))
 
 
-def _fit(shifts: FloatArray) -> tuple[FloatArray, float]:
-    """Fit the sum of d(θ) between neighbouring sectors; return x, y, c, s, p, and the error of x and y."""
-    sectors = shifts.size
-    angle = 2 * np.pi * np.arange(sectors) / sectors
-    before = angle - 2 * np.pi / sectors
+def _courses(angle_rad: FloatArray) -> FloatArray:
+    """The parts of d(θ), and a constant."""
+    harmonics = [np.cos(angle_rad), np.sin(angle_rad), np.cos(2 * angle_rad), np.sin(2 * angle_rad)]
+    return np.stack([*harmonics, angle_rad / (2 * np.pi), np.ones_like(angle_rad)], axis=1)
 
-    def of(turn: FloatArray) -> FloatArray:
-        return np.stack([np.cos(turn), np.sin(turn), np.cos(2 * turn), np.sin(2 * turn)], axis=1)
 
-    design = np.column_stack([of(angle) - of(before), np.full(sectors, 1 / sectors)])
+def _changes(angle_rad: FloatArray) -> FloatArray:
+    """The parts of d(θ) from one sector to the next."""
+    return (_courses(angle_rad) - _courses(angle_rad - 2 * np.pi / angle_rad.size))[:, :5]
+
+
+def _fit(shifts: FloatArray, design_of: Callable[[FloatArray], FloatArray]) -> tuple[FloatArray, float]:
+    """Fit d(θ); return right, up, c, s, −p and perhaps a constant, and the error of the first two."""
+    design = design_of(2 * np.pi * np.arange(shifts.size) / shifts.size)
     known = np.isfinite(shifts)
     require(
-        int(known.sum()) > sectors // 2,
+        int(known.sum()) > shifts.size // 2,
         "a picture in which grooves were seen in less than half of the disc",
         "a whole disc",
+        "say where the grooves are: --inner-px and --outer-px",
     )
 
     def residual(p: FloatArray) -> FloatArray:
         return np.asarray(design[known] @ p - shifts[known], np.float64)
 
-    solved = least_squares(residual, np.zeros(5), loss="soft_l1", f_scale=FIRM_PX)
-    rest = design[known] @ solved.x - shifts[known]
+    solved = least_squares(residual, np.zeros(design.shape[1]), loss="soft_l1", f_scale=FIRM_PX)
+    rest = residual(solved.x)
     spread = 1.4826 * float(np.median(np.abs(rest - np.median(rest))))
     covariance = np.linalg.inv(design[known].T @ design[known]) * spread**2
     return solved.x, float(np.sqrt(covariance[:2, :2].trace() / 2))
