@@ -1,0 +1,62 @@
+"""From groove to groove: the pitch in rows, by how the picture resembles itself a pitch away.
+
+Each column is compared with itself shifted, and what the columns say is added up; so it does not matter how the grooves
+wind, only that neighbours are alike in the same column.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gramoscope.conventions import Float32Array, FloatArray
+
+MOST_COLUMNS = 4000
+LEAST_PITCH_PX = 12
+LEAST_LIKENESS = 0.05
+"""A correlation below this is no likeness."""
+LONE_GROOVE = 0.75
+"""Share of the picture's height that counts as the pitch when nothing repeats."""
+
+
+def row_autocorrelation(level: Float32Array) -> FloatArray:
+    """Return how columns of a picture correlate with themselves some rows away.
+
+    Parameters
+    ----------
+    level : float32 array, shape (column, row)
+
+    Returns
+    -------
+    float64 array, shape (row // 3 * 2,)
+        For shifts from 0, where it is 1; unbiased for the part that overlaps.
+    """
+    rows = level.shape[1]
+    centred = level - level.mean(axis=1, keepdims=True)
+    spectrum = np.abs(np.fft.rfft(centred, 2 * rows, axis=1)) ** 2
+    shifts = max(rows * 2 // 3, 1)
+    power = np.fft.irfft(spectrum.sum(axis=0))[:shifts] / np.arange(rows, rows - shifts, -1)
+    return np.asarray(power / power[0] if power[0] > 0 else power, np.float64)
+
+
+def groove_pitch_px(level: Float32Array) -> float:
+    """Return the distance from groove to groove.
+
+    Parameters
+    ----------
+    level : float32 array, shape (column, row)
+        Brightness, in which specks have been cut off.
+
+    Returns
+    -------
+    float
+        The first shift at which the autocorrelation has a peak of at least 0.6 of its highest one after its first
+        valley; `LONE_GROOVE` of the height where nothing repeats.
+    """
+    some = level[:: int(np.ceil(level.shape[0] / MOST_COLUMNS))]
+    likeness = row_autocorrelation(np.minimum(some, np.quantile(some, 0.97)))
+    inner = np.arange(1, likeness.size - 1)
+    rising = (likeness[inner] >= likeness[inner - 1]) & (likeness[inner] > likeness[inner + 1])
+    peaks = inner[rising & (inner >= LEAST_PITCH_PX) & (likeness[inner] > LEAST_LIKENESS)]
+    if peaks.size == 0:
+        return LONE_GROOVE * level.shape[1]
+    return float(peaks[likeness[peaks] >= 0.6 * likeness[peaks].max()][0])
