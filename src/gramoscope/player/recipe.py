@@ -10,6 +10,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass, replace
 from difflib import get_close_matches
+from enum import Enum
 from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
@@ -210,7 +211,7 @@ def table_of_recipe(recipe: Recipe) -> dict[str, Any]:
         if parameter == "flow":
             pickup[parameter] = _table_of_chosen(_FLOWS, value)
         else:
-            pickup[parameter] = asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
+            pickup[parameter] = asdict(value) if is_dataclass(value) and not isinstance(value, type) else _named(value)
     return {
         "name": recipe.name,
         "about": recipe.about,
@@ -218,6 +219,11 @@ def table_of_recipe(recipe: Recipe) -> dict[str, Any]:
         "tonearm": {join: asdict(getattr(recipe, join)), "smoother": _table_of_chosen(_SMOOTHERS, recipe.smoother)},
         "preamp": {"passband": recipe.passband, **_table_of_repair(recipe.repair)},
     }
+
+
+def _named(value: Any) -> Any:
+    """A choice among a few by its name in TOML; anything else as it is."""
+    return value.name.lower().replace("_", "-") if isinstance(value, Enum) else value
 
 
 def _table_of_repair(repair: Repair) -> dict[str, Any]:
@@ -303,6 +309,8 @@ def build(kind: type[Part], table: Mapping[str, Any], where: str) -> Part:
 
 
 def _checked(hint: Any, value: Any, where: str) -> Any:
+    if isinstance(hint, type) and issubclass(hint, Enum):
+        return _member(hint, value, where)
     # TOML has no tuples, and pydantic's strictness (no "0.5" for 0.5, no true for 1) wants them
     given = tuple(value) if isinstance(value, list) else value
     try:
@@ -316,6 +324,13 @@ def _checked(hint: Any, value: Any, where: str) -> Any:
     ]
     require(all(number >= 0 for number in numbers), f"{where} = {value!r}", "zero or more")
     return checked
+
+
+def _member(choices: type[Enum], name: Any, where: str) -> Enum:
+    named = {_named(choice): choice for choice in choices}
+    if not isinstance(name, str) or name not in named:
+        raise ArgumentError(f"{where} = {name!r}", f"one of {', '.join(named)}")
+    return named[name]
 
 
 _IN_WORDS: dict[Any, str] = {

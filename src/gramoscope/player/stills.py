@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 SHOWN_PX = 2048
 """Columns of a picture that are drawn."""
-SILENCE_S = 0.002
+SILENCE_S = 0.001
 """Between two grooves that do not join."""
 GROOVE_COLUMNS = ("groove", "start_s", "stop_s", "length_mm", "turns", "first_picture", "last_picture", "measured")
 

@@ -80,9 +80,9 @@ class StillScene:
     land: float = 0.62
     outer_wall: float = 0.22
     inner_wall: float = 0.27
-    bottom: float = 0.36
+    bottom: float = 0.26
     blur_px: float = 0.9
-    grain: float = 0.06
+    grain: float = 0.03
     noise: float = 2.0
     dust_per_m: float = 60.0
     seed: int = 0
