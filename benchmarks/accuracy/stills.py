@@ -55,7 +55,7 @@ class Case:
 
     name: str
     scene: StillScene
-    pictures: int = 10
+    pictures: int = 20
     scan: bool = False
 
 
@@ -66,7 +66,7 @@ CASES = (
     Case("… twice the grain (6 %)", replace(BASE, turns=3, grain=0.06)),
     Case("… ten times the dust", replace(BASE, turns=3, dust_per_m=600.0)),
     Case("… cut vertically", replace(BASE, turns=3, disc=Disc(cut="vertical", groove_width_m=140e-6))),
-    Case("… pixels of 8 µm", replace(BASE, turns=3, turn_px=20_480, pixel_pitch_m=8e-6), pictures=5),
+    Case("… pixels of 8 µm", replace(BASE, turns=3, turn_px=20_480, pixel_pitch_m=8e-6), pictures=10),
     Case(
         "a scan of 2200 × 2200 pixels of 20 µm, straightened; at 1 cm/s",
         StillScene(turns=5, turn_px=round(2 * np.pi * 1050), pixel_pitch_m=20e-6, level_m_s=0.01, dust_per_m=10.0),

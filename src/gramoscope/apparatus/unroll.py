@@ -31,7 +31,7 @@ from gramoscope.errors import CaptureError, OutputError, require
 from gramoscope.signal_path import ImageArray
 from gramoscope.turntable.disc_centre import DiscCentre, groove_band, refined_centre, rough_centre
 
-STRIP_PX, SHARED_PX = 4096, 128
+STRIP_PX, SHARED_PX = 2048, 128
 """Columns of a picture that are its own, and those that it shares with the next."""
 AGAIN_PX = 256
 """Columns beyond the turn that show its start once more."""
