@@ -40,8 +40,8 @@ class ColumnPlaces:
         Of the step; infinite where the column says nothing.
     lost : float64 array, shape (column,)
         0 … 1, the share of its information that the column has lost to dust and the like.
-    correlation_samples : float
-        How many neighbouring columns share one error.
+    likeness : float64 array, shape (lag,)
+        Correlation of the errors of columns so far apart, from lag 0, where it is 1.
     kept : bool array, shape (column, place)
         Pixels that are no dust.
     """
@@ -49,7 +49,7 @@ class ColumnPlaces:
     step: FloatArray
     variance: FloatArray
     lost: FloatArray
-    correlation_samples: float
+    likeness: FloatArray
     kept: BoolArray
 
 
@@ -79,8 +79,7 @@ def column_places(band: EdgeBand, profile: EdgeProfile, kept: BoolArray, *, dust
         share = kept * profile.gradient / noise / gain[:, None]
         lost = np.where(whole > 0, 1 - gain / whole, 1.0)
         variance = np.where(gain > 0, _variance(np.where(gain[:, None] > 0, share, 0.0), likeness(after.T)), np.inf)
-    shared = 1 + 2 * float(np.maximum(likeness(after)[1:], 0).sum())
-    return ColumnPlaces(step, variance, lost, shared, kept)
+    return ColumnPlaces(step, variance, lost, likeness(after), kept)
 
 
 def _steps(

@@ -6,13 +6,15 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from scipy.ndimage import binary_dilation
+from scipy.ndimage import binary_erosion, maximum_filter
 
 from gramoscope.conventions import INNER, BoolArray, Float32Array, FloatArray
 from gramoscope.signal_path import StillPicture
 
 HALO_PX = 2
 """So far about a burnt pixel its neighbours are spoilt by its blur."""
+BLOB_PX, GLARE_PX = 5, 8
+"""A burnt square of this side glares so far about its middle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,11 +70,23 @@ def edge_band(picture: StillPicture, row: FloatArray, *, wall: int, half_px: int
     """
     sign = 1 if wall == INNER else -1
     nearest = np.rint(row).astype(np.int64)
-    reach = half_px + HALO_PX
+    reach = half_px + GLARE_PX
     shape = (row.size, 2 * reach + 1)
     level, usable, scorched = np.zeros(shape, np.float32), np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
     _gather(picture.image, picture.seen, nearest - sign * reach, sign, burnt, level, usable, scorched)
-    scorched = binary_dilation(scorched, np.ones((2 * HALO_PX + 1, 2 * HALO_PX + 1)))
-    kept = slice(HALO_PX, -HALO_PX)
+    scorched = _with_halo(scorched)
+    kept = slice(GLARE_PX, -GLARE_PX)
     place = sign * (nearest - row)[:, None] + np.arange(-half_px, half_px + 1)
     return EdgeBand(level[:, kept], place, (usable & ~scorched)[:, kept], scorched[:, kept], sign)
+
+
+def _with_halo(burnt: BoolArray) -> BoolArray:
+    """Burnt pixels and those that they spoil: a few about specks and writing, more about blobs."""
+    if not burnt.any():
+        return burnt
+    blobs = binary_erosion(burnt, np.ones((BLOB_PX, BLOB_PX)))
+    # a filter of squares goes row by row and column by column, where a dilation goes through the square
+    halo, glare = (
+        maximum_filter(part.view(np.uint8), 2 * reach + 1) for part, reach in ((burnt, HALO_PX), (blobs, GLARE_PX))
+    )
+    return np.asarray((halo | glare) > 0)

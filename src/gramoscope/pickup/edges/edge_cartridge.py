@@ -93,8 +93,7 @@ class EdgeCartridge:
     def coarse(self, picture: StillPicture, burnt: int) -> tuple[list[CoarseGroove], float]:
         """Return the coarse courses of the edges of every groove, a place a column, and the pitch in rows."""
         rows, columns = picture.image.shape
-        level, _ = block_means(picture, burnt, max(1, columns // 500))
-        pitch_px = groove_pitch_px(level)
+        pitch_px = groove_pitch_px(*block_means(picture, burnt, max(1, columns // 500)))
         block_px = int(np.clip(BLOCK_SHARE * pitch_px, 1, max(columns // 32, 1)))
         evidence = step_evidence(picture, self.appearance, pitch_px=pitch_px, burnt=burnt, block_px=block_px)
         courses = find_courses(

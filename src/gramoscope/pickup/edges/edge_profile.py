@@ -34,6 +34,10 @@ class EdgeProfile:
 
     Attributes
     ----------
+    light : float64 array, shape (column,)
+        B, grey levels.
+    shape : CubicSpline
+        p.
     expected : float64 array, shape (column, place)
         Grey levels of the band if the edge is on its course.
     gradient : float64 array, shape (column, place)
@@ -45,6 +49,8 @@ class EdgeProfile:
         where it is brightest or darkest.
     """
 
+    light: FloatArray
+    shape: CubicSpline
     expected: FloatArray
     gradient: FloatArray
     amplitude: FloatArray
@@ -92,7 +98,7 @@ def learn_profile(band: EdgeBand, kept: BoolArray, *, line: bool = False) -> Edg
     """
     place, weight = band.from_edge_px, kept.astype(np.float64)
     half_px = (place.shape[1] - 1) / 2 + 0.5
-    light = _light(band, weight)[:, None]
+    light = _light(band, weight, half_px)[:, None]
     value = band.level / light
     soft = ndtr(place / SOFT_STEP_PX)
     land = place > AWAY_PX
@@ -114,6 +120,8 @@ def learn_profile(band: EdgeBand, kept: BoolArray, *, line: bool = False) -> Edg
     # only what is near the edge tells where it is; the rest may be patches of land
     near = np.clip(2.0 * (1 - np.abs(place) / half_px), 0.0, 1.0)
     return EdgeProfile(
+        light[:, 0],
+        profile,
         light * (shape + patches),
         -light * slope * near,
         _amplitude(value, shape, weight),
@@ -121,13 +129,14 @@ def learn_profile(band: EdgeBand, kept: BoolArray, *, line: bool = False) -> Edg
     )
 
 
-def _light(band: EdgeBand, weight: FloatArray) -> FloatArray:
-    """The strength of the light along the course, about which the profile is 1 in the mean."""
-    count = weight.sum(axis=1)
-    mean = np.where(count > 0, (band.level * weight).sum(axis=1) / np.maximum(count, 1), 0.0)
-    level = along(mean, count, LIGHT_COLUMNS)
-    usual = float(np.median(level[level > 0])) if (level > 0).any() else 1.0
-    return np.maximum(level, 0.02 * usual)
+def _light(band: EdgeBand, weight: FloatArray, half_px: float) -> FloatArray:
+    """The strength of the light along the course: regression on what is usual at each place across the edge."""
+    usual, _ = binned(band.from_edge_px, band.level, weight, half_px)
+    expected = np.interp(band.from_edge_px, np.arange(usual.size) * KNOT_PX - half_px, usual)
+    power = (weight * expected**2).sum(axis=1)
+    strength = (weight * expected * np.minimum(band.level, 2 * expected)).sum(axis=1) / np.maximum(power, 1e-12)
+    scale = float(usual.mean()) if usual.any() else 1.0
+    return scale * np.maximum(along(strength, power, LIGHT_COLUMNS), 0.02)
 
 
 def _side(rest: FloatArray, weight: FloatArray) -> FloatArray:

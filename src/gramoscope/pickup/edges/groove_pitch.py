@@ -38,13 +38,15 @@ def row_autocorrelation(level: Float32Array) -> FloatArray:
     return np.asarray(power / power[0] if power[0] > 0 else power, np.float64)
 
 
-def groove_pitch_px(level: Float32Array) -> float:
+def groove_pitch_px(level: Float32Array, share: Float32Array) -> float:
     """Return the distance from groove to groove.
 
     Parameters
     ----------
     level : float32 array, shape (column, row)
-        Brightness, in which specks have been cut off.
+        Brightness.
+    share : float32 array, shape (column, row)
+        0 where nothing is known of it.
 
     Returns
     -------
@@ -52,8 +54,12 @@ def groove_pitch_px(level: Float32Array) -> float:
         The first shift at which the autocorrelation has a peak of at least 0.6 of its highest one after its first
         valley; `LONE_GROOVE` of the height where nothing repeats.
     """
-    some = level[:: int(np.ceil(level.shape[0] / MOST_COLUMNS))]
-    likeness = row_autocorrelation(np.minimum(some, np.quantile(some, 0.97)))
+    step = int(np.ceil(level.shape[0] / MOST_COLUMNS))
+    some, known = level[::step], share[::step] > 0
+    if not known.any():
+        return LONE_GROOVE * level.shape[1]
+    low, middle, high = np.quantile(some[known], (0.02, 0.5, 0.97))
+    likeness = row_autocorrelation(np.where(known, np.clip(some, low, high), middle).astype(np.float32))
     inner = np.arange(1, likeness.size - 1)
     rising = (likeness[inner] >= likeness[inner - 1]) & (likeness[inner] > likeness[inner + 1])
     peaks = inner[rising & (inner >= LEAST_PITCH_PX) & (likeness[inner] > LEAST_LIKENESS)]

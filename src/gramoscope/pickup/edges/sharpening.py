@@ -20,6 +20,7 @@ from gramoscope.errors import require
 from gramoscope.pickup.edges.column_places import ColumnPlaces, column_places
 from gramoscope.pickup.edges.edge_band import EdgeBand, edge_band
 from gramoscope.pickup.edges.edge_profile import EdgeProfile, learn_profile
+from gramoscope.pickup.edges.pooling import Pooled, pool_columns, pooled
 from gramoscope.pickup.edges.steady_course import FEWEST_PLACES, SteadyCourse, steady_course
 from gramoscope.quality import FlagArray, Quality, no_flags
 from gramoscope.signal_path import StillPicture
@@ -29,6 +30,8 @@ COARSE_SIGMA_PX = 1.5
 """Error of the coarse course."""
 GREATEST_STEP_PX = 2.5
 """In one round no column moves its place by more."""
+GUIDE_SIGMA_PX = 2.5
+"""Error of the coarse course where nothing else leads."""
 LEAST_SIGMA_PX = 1e-3
 """No place is claimed to be known better than this."""
 LEAST_SHARE = 0.02
@@ -61,8 +64,9 @@ class _Round:
     band: EdgeBand
     profile: EdgeProfile
     places: ColumnPlaces
+    course: SteadyCourse
     row: FloatArray
-    scale: float
+    variance: FloatArray
     measured: BoolArray
     settled: SteadyCourse
 
@@ -81,6 +85,9 @@ class Sharpening:
         A place so many standard errors off the smooth course is an outlier.
     most_lost : float
         A column that has lost more of its information than this share is not measured.
+    most_pooled : float
+        Largest standard deviation, in columns, of the window over which places are pooled where the edge allows it
+        (`pooling`); 0 keeps every column to itself.
     least_amplitude : float
         Where less of the profile is seen than this there is no edge.
     """
@@ -89,6 +96,7 @@ class Sharpening:
     dust_gate: float = 4.0
     column_gate: float = 4.0
     most_lost: float = 0.6
+    most_pooled: float = 2.0
     least_amplitude: float = 0.3
 
     def __post_init__(self) -> None:
@@ -96,6 +104,7 @@ class Sharpening:
         for name in ("dust_gate", "column_gate"):
             require(getattr(self, name) > 2, f"{name} is {getattr(self, name)}", "above 2 standard errors")
         require(0 < self.most_lost < 1, f"most_lost is {self.most_lost}", "between 0 and 1")
+        require(self.most_pooled >= 0, f"most_pooled is {self.most_pooled} columns", "0 or more")
         require(0 <= self.least_amplitude < 1, f"least_amplitude is {self.least_amplitude}", "from 0, below 1")
 
     def sharpen(
@@ -123,18 +132,19 @@ class Sharpening:
             None where hardly a column shows the edge.
         """
         inside = (coarse > 0) & (coarse < picture.image.shape[0] - 1)
-        enough = max(FEWEST_PLACES, LEAST_SHARE * coarse.size)
-        if np.count_nonzero(inside) < enough:
+        if np.count_nonzero(inside) < max(FEWEST_PLACES, LEAST_SHARE * coarse.size):
             return None
         settled = steady_course(coarse, np.full(coarse.size, COARSE_SIGMA_PX**-2))
-        kept = None
+        seen, kept = None, None
         for number in range(self.rounds):
             band = edge_band(picture, settled.row, wall=wall, half_px=half_px, burnt=burnt)
-            seen = self._look(band, settled, kept, inside, line=line, gated=number >= self.rounds // 2)
+            # where nothing is measured yet the coarse course leads, so that it can be found again
+            guide = coarse if number < self.rounds - 2 else None
+            seen = self._look(band, settled, kept, inside, guide, line=line, gated=number >= self.rounds // 2)
             if seen is None:
                 return None
-            kept, settled = seen.places.kept & band.usable, seen.settled
-        return self._edge(seen, inside)
+            kept, settled = seen.places.kept, seen.settled
+        return None if seen is None else self._edge(seen, inside)
 
     def _look(
         self,
@@ -142,6 +152,7 @@ class Sharpening:
         course: SteadyCourse,
         kept: BoolArray | None,
         inside: BoolArray,
+        guide: FloatArray | None,
         *,
         line: bool,
         gated: bool,
@@ -150,27 +161,41 @@ class Sharpening:
         profile = learn_profile(band, band.usable if kept is None else kept & band.usable, line=line)
         places = column_places(band, profile, band.usable, dust_gate=self.dust_gate)
         step = np.clip(places.step, -GREATEST_STEP_PX, GREATEST_STEP_PX)
-        seen = inside & (places.lost < self.most_lost) & np.isfinite(places.variance)
+        # a column that leaves its edge anywhere in the band says nothing
+        seen = inside & (places.lost < self.most_lost) & (places.variance < (0.25 * band.level.shape[1]) ** 2)
         seen &= profile.amplitude > self.least_amplitude
         if np.count_nonzero(seen) < max(FEWEST_PLACES, LEAST_SHARE * seen.size):
             return None
         variance = np.maximum(np.where(seen, places.variance, 1.0), LEAST_SIGMA_PX**2)
-        scale = _scale(step[seen] / np.sqrt(variance[seen]))
         if gated:
-            gate = self.column_gate * np.sqrt(scale**2 * variance + course.variance)
-            seen &= np.abs(places.step) < gate
+            scale = _scale(step[seen] / np.sqrt(variance[seen]))
+            seen &= np.abs(places.step) < self.column_gate * np.sqrt(scale**2 * variance + course.variance)
         row = course.row + band.towards_land * (step + profile.middle_px)
-        weight = seen / (variance * scale**2 * places.correlation_samples)
-        return _Round(band, profile, places, row, scale, seen, steady_course(row, weight))
+        weight = seen / (variance * (1 + 2 * places.likeness[1:].sum()))
+        if guide is None:
+            settled = steady_course(row, weight)
+        else:
+            leading = inside & ~seen & ~band.burnt.any(axis=1)
+            settled = steady_course(np.where(leading, guide, row), np.where(leading, GUIDE_SIGMA_PX**-2, weight))
+        return _Round(band, profile, places, course, row, variance, seen, settled)
 
     def _edge(self, last: _Round, inside: BoolArray) -> SharpEdge:
         measured, bridge = last.measured, last.settled
-        sigma = np.sqrt(np.maximum(last.places.variance, LEAST_SIGMA_PX**2)) * last.scale
-        row = np.where(measured, last.row, bridge.row)
-        sigma = np.where(measured, sigma, np.sqrt(bridge.variance))
+        found = self._pooled(last)
+        row = bridge.row + np.where(measured, found.value, 0.0)
+        sigma = np.sqrt(np.where(measured, found.variance, bridge.variance))
         nowhere = ~inside | (sigma > last.band.level.shape[1])
         row[nowhere], sigma[nowhere] = np.nan, np.nan
-        return SharpEdge(row, sigma, self._flags(last, inside), last.places.correlation_samples)
+        return SharpEdge(row, sigma, self._flags(last, inside), found.correlation_samples)
+
+    def _pooled(self, last: _Round) -> Pooled:
+        """Deviations from the last course, pooled as far as it allows."""
+        shared = 1 + 2 * last.places.likeness[1:].sum()
+        weight = 1 / float(np.median(last.variance[last.measured]) * shared)
+        columns = pool_columns(weight, last.settled.stiffness, most=self.most_pooled)
+        off = last.row - last.settled.row
+        scale = _scale(off[last.measured] / np.sqrt(last.variance[last.measured]))
+        return pooled(off, scale**2 * last.variance, last.measured, last.places.likeness, columns=columns)
 
     def _flags(self, last: _Round, inside: BoolArray) -> FlagArray:
         """Why a column was not measured."""

@@ -1,13 +1,13 @@
 """The smooth course through places with errors, as smooth as the places themselves say.
 
 Third differences of the course are taken for independent with one variance 1/λ, and the places for the course plus errors
-of known variance 1/w. Then the course of greatest probability is that of Whittaker and Henderson,
+of variance s²/w, with s² at least one: places may scatter more than their errors say, not less. Then the course of greatest probability is that of Whittaker and Henderson,
 
-    (W + λ D'D) x = W y,
+    (W + κ D'D) x = W y,       κ = λ s²,
 
-and λ is that of greatest marginal likelihood,
+and κ and s² are those of greatest marginal likelihood, with m places of weight above 0 among n columns,
 
-    −2 ln p(y) = (y − x)'W(y − x) + λ |D x|² + ln |W + λ D'D| − (n − 3) ln λ + …,
+    −2 ln p(y) = R/s² + (m − 3) ln s² + ln |W + κ D'D| − (n − 3) ln κ + …,     R = (y − x)'W(y − x) + κ |D x|²,
 
 which the Cholesky factor of the banded matrix gives along the way. Its inverse has the variances of the course on its
 diagonal (Takahashi's recursion). A gap has w = 0: it is bridged, and its variance grows.
@@ -26,7 +26,7 @@ from gramoscope.conventions import FloatArray
 
 ORDER = 3
 STIFFNESS_DECADES = (-3.0, 7.0)
-"""λ over the median weight: between places that are followed one by one and a parabola."""
+"""κ over the median weight: between places that are followed one by one and a parabola."""
 FEWEST_PLACES = 8
 
 
@@ -38,9 +38,9 @@ class SteadyCourse:
     ----------
     row : float64 array, shape (column,)
     variance : float64 array, shape (column,)
-        Of the course, given the errors of the places and the stiffness.
+        Of the course, given the errors of the places, s² and the stiffness.
     stiffness : float
-        λ.
+        κ.
     """
 
     row: FloatArray
@@ -84,7 +84,7 @@ def steady_course(row: FloatArray, weight: FloatArray, *, stiffness: float | Non
     weight : float64 array, shape (column,)
         Inverse variance of each place; at least `FEWEST_PLACES` above 0.
     stiffness : float, optional
-        λ; by the greatest marginal likelihood when left out.
+        κ; by the greatest marginal likelihood when left out.
 
     Returns
     -------
@@ -96,21 +96,25 @@ def steady_course(row: FloatArray, weight: FloatArray, *, stiffness: float | Non
     origin = float(np.average(place, weights=weight))
     place = np.where(weight > 0, place - origin, 0.0)
     scale = float(np.median(weight[weight > 0]))
+    free = max(np.count_nonzero(weight) - ORDER, 1)
 
-    def solved(stiffness: float) -> tuple[FloatArray, FloatArray]:
+    def solved(stiffness: float) -> tuple[FloatArray, FloatArray, float]:
         matrix = stiffness * roughness
         matrix[0] += weight
         factor = cholesky_banded(matrix, lower=True, check_finite=False)
-        return factor, cho_solve_banded((factor, True), weight * place, check_finite=False)
+        course = cho_solve_banded((factor, True), weight * place, check_finite=False)
+        misfit = float(np.sum(weight * (place - course) ** 2) + stiffness * np.sum(np.diff(course, ORDER) ** 2))
+        return factor, course, misfit
 
     def surprise(decades: float) -> float:
         stiffness = scale * 10**decades
-        factor, course = solved(stiffness)
-        misfit = float(np.sum(weight * (place - course) ** 2) + stiffness * np.sum(np.diff(course, ORDER) ** 2))
-        return misfit + 2 * float(np.sum(np.log(factor[0]))) - (row.size - ORDER) * float(np.log(stiffness))
+        factor, _, misfit = solved(stiffness)
+        spread = max(1.0, misfit / free)
+        volume = 2 * float(np.sum(np.log(factor[0]))) - (row.size - ORDER) * float(np.log(stiffness))
+        return misfit / spread + free * float(np.log(spread)) + volume
 
     if stiffness is None:
         best = minimize_scalar(surprise, bounds=STIFFNESS_DECADES, method="bounded", options={"xatol": 0.1})
         stiffness = scale * 10 ** float(best.x)
-    factor, course = solved(stiffness)
-    return SteadyCourse(course + origin, _inverse_diagonal(factor), stiffness)
+    factor, course, misfit = solved(stiffness)
+    return SteadyCourse(course + origin, _inverse_diagonal(factor) * max(1.0, misfit / free), stiffness)
