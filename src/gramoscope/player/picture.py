@@ -31,7 +31,10 @@ def worst_places(capture: AnyCapture, reading: Reading, monitor: Monitor) -> lis
     """Draw the worst groups of a transfer of which at least one frame is left, the worst first."""
     sensor, places = capture.bench.sensor, list[Place]()
     for group in monitor.quality.worst.worst_first() if monitor.quality is not None else ():
-        sketch = reading.sketch(group.number) if len(places) < WORST_PLACES else None
+        # a photograph has many grooves, and is drawn with all of them
+        drawn = {place.group.number for place in places}
+        wanted = len(places) < WORST_PLACES and group.number not in drawn
+        sketch = reading.sketch(group.number) if wanted else None
         if sketch is not None:
             figure = frame_figure(
                 sketch.image,

@@ -19,13 +19,14 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 from scipy.optimize import minimize_scalar
 
 from gramoscope.conventions import FloatArray
 
 ORDER = 3
 STIFFNESS_DECADES = (-3.0, 7.0)
+IMPOSSIBLE = 1e12
 """κ over the median weight: between places that are followed one by one and a parabola."""
 FEWEST_PLACES = 8
 
@@ -108,7 +109,11 @@ def steady_course(row: FloatArray, weight: FloatArray, *, stiffness: float | Non
 
     def surprise(decades: float) -> float:
         stiffness = scale * 10**decades
-        factor, _, misfit = solved(stiffness)
+        try:
+            factor, _, misfit = solved(stiffness)
+        except LinAlgError:
+            # a groove that leaves the picture: over so many columns without a place nothing this stiff can be solved
+            return IMPOSSIBLE * (1 + decades - STIFFNESS_DECADES[0])
         spread = max(1.0, misfit / free)
         volume = 2 * float(np.sum(np.log(factor[0]))) - (row.size - ORDER) * float(np.log(stiffness))
         return misfit / spread + free * float(np.log(spread)) + volume
