@@ -22,7 +22,7 @@ from gramoscope.pickup.edges.edge_band import EdgeBand
 KNOT_PX = 0.5
 SOFT_STEP_PX = 1.0
 """Standard deviation of the Gaussian under the soft step h."""
-AWAY_PX = 2.0
+AWAY_PX = 3.0
 """Land and wall are what lies farther from the edge than this."""
 LIGHT_COLUMNS, PATCH_COLUMNS = 40.0, 12.0
 """Standard deviations of the windows, in columns, over which the light, and land and wall, are averaged."""

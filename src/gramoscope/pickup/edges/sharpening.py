@@ -26,7 +26,7 @@ from gramoscope.quality import FlagArray, Quality, no_flags
 from gramoscope.signal_path import StillPicture
 
 MAD_TO_SIGMA = 1.4826
-COARSE_SIGMA_PX = 1.5
+COARSE_SIGMA_PX = 3.0
 """Error of the coarse course."""
 GREATEST_STEP_PX = 2.5
 """In one round no column moves its place by more."""
@@ -135,12 +135,13 @@ class Sharpening:
         if np.count_nonzero(inside) < max(FEWEST_PLACES, LEAST_SHARE * coarse.size):
             return None
         settled = steady_course(coarse, np.full(coarse.size, COARSE_SIGMA_PX**-2))
+        guide = settled.row
         seen, kept = None, None
         for number in range(self.rounds):
             band = edge_band(picture, settled.row, wall=wall, half_px=half_px, burnt=burnt)
             # where nothing is measured yet the coarse course leads, so that it can be found again
-            guide = coarse if number < self.rounds - 2 else None
-            seen = self._look(band, settled, kept, inside, guide, line=line, gated=number >= self.rounds // 2)
+            leading = guide if number < self.rounds - 2 else None
+            seen = self._look(band, settled, kept, inside, leading, line=line, gated=number >= self.rounds // 2)
             if seen is None:
                 return None
             kept, settled = seen.places.kept, seen.settled
