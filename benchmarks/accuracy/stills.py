@@ -63,7 +63,7 @@ BASE = StillScene(turns=12, turn_px=40_960)
 CASES = (
     Case("12 turns, dust: 60 specks a metre", BASE),
     Case("3 turns", replace(BASE, turns=3)),
-    Case("… twice the grain (6 %)", replace(BASE, turns=3, grain=0.06)),
+    Case("… three times the grain (3 %), twice the noise", replace(BASE, turns=3, grain=0.03, noise=2.0)),
     Case("… ten times the dust", replace(BASE, turns=3, dust_per_m=600.0)),
     Case("… cut vertically", replace(BASE, turns=3, disc=Disc(cut="vertical", groove_width_m=140e-6))),
     Case("… pixels of 8 µm", replace(BASE, turns=3, turn_px=20_480, pixel_pitch_m=8e-6), pictures=10),

@@ -78,12 +78,12 @@ class StillScene:
     groove_pitch_m: float = 260e-6
     level_m_s: float = 0.03
     land: float = 0.62
-    outer_wall: float = 0.22
-    inner_wall: float = 0.27
-    bottom: float = 0.26
+    outer_wall: float = 0.25
+    inner_wall: float = 0.25
+    bottom: float = 0.25
     blur_px: float = 0.9
-    grain: float = 0.03
-    noise: float = 2.0
+    grain: float = 0.01
+    noise: float = 1.0
     dust_per_m: float = 60.0
     seed: int = 0
 

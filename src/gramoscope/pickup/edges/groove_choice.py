@@ -17,6 +17,8 @@ from gramoscope.pickup.edges.courses import Course
 
 EDGES_FROM = 0.6
 """A course that collects less than this share of what the best one does is no edge, whatever the gaps."""
+CLEAR = 3.0
+"""Courses that all collect more are all edges: chance collects half of it at the most."""
 LEAST_GAP = 0.1
 """A narrower gap, in standard deviations of the evidence, tells nothing from nothing."""
 
@@ -37,7 +39,8 @@ def least_evidence(courses: Sequence[Course]) -> float:
     gap = np.where(evidence[:-1] >= EDGES_FROM * evidence[0], -np.diff(evidence), 0.0)
     widest = int(np.argmax(gap))
     if gap[widest] < LEAST_GAP:
-        return float("inf")
+        # a clean picture: nothing wanders, for there is nothing else to collect
+        return EDGES_FROM * float(evidence[0]) if evidence[-1] >= CLEAR else float("inf")
     return float(0.5 * (evidence[widest] + evidence[widest + 1]))
 
 
