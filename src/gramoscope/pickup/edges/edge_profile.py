@@ -12,13 +12,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline, make_smoothing_spline
+from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 from scipy.special import ndtr
 
 from gramoscope.conventions import BoolArray, FloatArray
 from gramoscope.pickup.edges.edge_band import EdgeBand
 from gramoscope.pickup.edges.likeness import shared_pixels
+from gramoscope.pickup.edges.steady_course import steady_course
 
 KNOT_PX = 0.5
 SOFT_STEP_PX = 1.0
@@ -81,12 +82,13 @@ def binned(place: FloatArray, value: FloatArray, weight: FloatArray, half_px: fl
 
 
 def _learned(place: FloatArray, value: FloatArray, weight: FloatArray, half_px: float) -> CubicSpline:
-    """The profile as a spline, as smooth as its means at the knots say (generalised cross-validation)."""
+    """The profile as a spline, as smooth as its means at the knots say (`steady_course`)."""
     mean, weights = binned(place, value, weight, half_px)
     knots = np.arange(mean.size) * KNOT_PX - half_px
     known = weights > 1e-3 * weights.max()
-    smooth = make_smoothing_spline(knots[known], mean[known], weights[known] / weights.max())
-    return CubicSpline(knots, smooth(np.clip(knots, knots[known][0], knots[known][-1])))
+    scatter = float((weight * (value - np.interp(place, knots, mean)) ** 2).sum() / max(weight.sum(), 1.0))
+    precision = np.where(known, weights / max(scatter, 1e-9), 0.0)
+    return CubicSpline(knots, steady_course(mean, precision).row)
 
 
 def learn_profile(band: EdgeBand, kept: BoolArray, *, line: bool = False) -> EdgeProfile:

@@ -15,8 +15,8 @@ import numpy as np
 from gramoscope.conventions import INNER, OUTER
 from gramoscope.pickup.edges.courses import Course
 
-CHANCE, CERTAINTY = 1.8, 2.8
-"""Evidence, in standard deviations, that paths find in noise at the most, and that is an edge for sure: the gap is between."""
+CHANCE, CERTAINTY = 2.0, 2.8
+"""Evidence, in standard deviations, below which all is chance, and above which all is edges."""
 LEAST_GAP = 0.1
 """A narrower gap, in standard deviations of the evidence, tells nothing from nothing."""
 HALF_GROOVE, WHOLE_GROOVE = 0.7, 0.25
@@ -37,7 +37,7 @@ def least_evidence(courses: Sequence[Course]) -> float:
     if evidence.size < 2:
         return float("inf")
     middle = 0.5 * (evidence[:-1] + evidence[1:])
-    gap = np.where((middle >= CHANCE) & (middle <= CERTAINTY), -np.diff(evidence), 0.0)
+    gap = np.where((evidence[:-1] >= CHANCE) & (evidence[1:] <= CERTAINTY), -np.diff(evidence), 0.0)
     widest = int(np.argmax(gap))
     if gap[widest] < LEAST_GAP:
         return float("inf")
