@@ -26,6 +26,9 @@ NOISE_COLUMNS = 20.0
 LEAST_NOISE = 1e-3
 """Noise is never taken for less than this share of the range of grey levels in the band."""
 
+FLAT = 0.2
+"""Share of the steepest gradient below which a profile counts as flat."""
+
 
 @dataclass(frozen=True, eq=False)
 class ColumnPlaces:
@@ -74,11 +77,13 @@ def column_places(band: EdgeBand, profile: EdgeProfile, kept: BoolArray, *, dust
         noise = _noise(band, after, profile.gradient, noise, kept)
         step, gain, whole = _steps(rest, profile.gradient, noise, kept)
     after = np.where(kept, (rest - profile.gradient * step[:, None]) / noise, 0.0)
+    # the step has taken noise along where the profile is steep; likeness is judged where it is not
+    beside = np.where(np.abs(profile.gradient) < FLAT * np.abs(profile.gradient).max(), after, 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         share = kept * profile.gradient / noise / gain[:, None]
         lost = np.where(whole > 0, 1 - gain / whole, 1.0)
-        variance = np.where(gain > 0, _variance(np.where(gain[:, None] > 0, share, 0.0), likeness(after.T)), np.inf)
-    return ColumnPlaces(step, variance, lost, likeness(after), kept)
+        variance = np.where(gain > 0, _variance(np.where(gain[:, None] > 0, share, 0.0), likeness(beside.T)), np.inf)
+    return ColumnPlaces(step, variance, lost, likeness(beside), kept)
 
 
 def _steps(
