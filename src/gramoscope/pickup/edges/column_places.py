@@ -19,13 +19,15 @@ from scipy.ndimage import binary_dilation
 from gramoscope.conventions import BoolArray, FloatArray
 from gramoscope.pickup.edges.edge_band import EdgeBand
 from gramoscope.pickup.edges.edge_profile import KNOT_PX, EdgeProfile, along, binned
+from gramoscope.pickup.edges.likeness import likeness
 
 NOISE_COLUMNS = 20.0
 """Standard deviation of the window, in columns, over which the strength of the noise is averaged."""
-LAGS = 6
-"""Pixels so many rows or columns apart have independent noise."""
 LEAST_NOISE = 1e-3
 """Noise is never taken for less than this share of the range of grey levels in the band."""
+
+FLAT = 0.2
+"""Share of the steepest gradient below which a profile counts as flat."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +77,13 @@ def column_places(band: EdgeBand, profile: EdgeProfile, kept: BoolArray, *, dust
         noise = _noise(band, after, profile.gradient, noise, kept)
         step, gain, whole = _steps(rest, profile.gradient, noise, kept)
     after = np.where(kept, (rest - profile.gradient * step[:, None]) / noise, 0.0)
+    # the step has taken noise along where the profile is steep; likeness is judged where it is not
+    beside = np.where(np.abs(profile.gradient) < FLAT * np.abs(profile.gradient).max(), after, 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         share = kept * profile.gradient / noise / gain[:, None]
         lost = np.where(whole > 0, 1 - gain / whole, 1.0)
-        variance = np.where(gain > 0, _variance(np.where(gain[:, None] > 0, share, 0.0), likeness(after.T)), np.inf)
-    return ColumnPlaces(step, variance, lost, likeness(after), kept)
+        variance = np.where(gain > 0, _variance(np.where(gain[:, None] > 0, share, 0.0), likeness(beside.T)), np.inf)
+    return ColumnPlaces(step, variance, lost, likeness(beside), kept)
 
 
 def _steps(
@@ -123,24 +127,6 @@ def _at_places(band: EdgeBand, knots: FloatArray, half_px: float) -> FloatArray:
     smooth = np.convolve(np.pad(knots, 2, mode="edge"), np.array([1, 2, 3, 2, 1]) / 9, mode="valid")
     floor = LEAST_NOISE * max(float(np.ptp(band.level)), 1.0)
     return np.maximum(np.interp(band.from_edge_px, np.arange(knots.size) * KNOT_PX - half_px, smooth), floor)
-
-
-def likeness(rest: FloatArray) -> FloatArray:
-    """Return how noise in units of itself, 0 where unknown, correlates with itself 0 … `LAGS` − 1 further along the first axis."""
-    known = rest != 0
-    power = float((rest**2).sum()) / max(int(known.sum()), 1)
-    found = np.zeros(LAGS)
-    found[0] = 1.0
-    for lag in range(1, min(LAGS, rest.shape[0])):
-        pairs = int((known[lag:] & known[:-lag]).sum())
-        if pairs == 0 or power == 0:
-            break
-        rho = float((rest[lag:] * rest[:-lag]).sum()) / pairs / power
-        # likeness that is no more than chance is none, and what follows it neither
-        if rho < 2 / np.sqrt(pairs):
-            break
-        found[lag] = rho
-    return found
 
 
 def _variance(share: FloatArray, rho: FloatArray) -> FloatArray:

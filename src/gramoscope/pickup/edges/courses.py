@@ -20,7 +20,7 @@ SLOPE_COST = 0.3
 CLOSED = -50.0
 """Evidence in a corridor that is taken."""
 WORTHLESS = 0.5
-"""Looking ends with a path that collects less than this share of the best one's evidence."""
+"""Looking ends with the first path that collects less than this share of the best one's evidence."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,11 +103,11 @@ def find_courses(
             path, total = best_path(found, reach, cost, back)
             tried.append(Course(wall, path, float(total) / path.size))
         best = max(tried, key=lambda course: course.evidence)
-        if courses and best.evidence < WORTHLESS * courses[0].evidence:
+        courses.append(Course(best.wall, best.row - float(margin_px), best.evidence))
+        if best.evidence < WORTHLESS * courses[0].evidence:
             break
         for found in maps.values():
             _close(found, best.row, corridor_px, np.float32(CLOSED))
-        courses.append(Course(best.wall, best.row - float(margin_px), best.evidence))
     return courses
 
 

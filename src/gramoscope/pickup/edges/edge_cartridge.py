@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from gramoscope.conventions import INNER, OUTER, FloatArray
+from gramoscope.conventions import INNER, OUTER
 from gramoscope.errors import require
 from gramoscope.pickup.cartridge import Line, Sketch
 from gramoscope.pickup.edges.appearance import Appearance
 from gramoscope.pickup.edges.courses import Course, find_courses
 from gramoscope.pickup.edges.groove_choice import CoarseGroove, choose_grooves
-from gramoscope.pickup.edges.groove_pitch import groove_pitch_px
+from gramoscope.pickup.edges.groove_pitch import groove_pitches_px
 from gramoscope.pickup.edges.sharpening import SharpEdge, Sharpening
 from gramoscope.pickup.edges.step_evidence import block_means, burnt_level, step_evidence
 from gramoscope.quality import NOT_MEASURED, Quality, no_flags
@@ -92,8 +92,18 @@ class EdgeCartridge:
 
     def coarse(self, picture: StillPicture, burnt: int) -> tuple[list[CoarseGroove], float]:
         """Return the coarse courses of the edges of every groove, a place a column, and the pitch in rows."""
+        pitches = groove_pitches_px(*block_means(picture, burnt, max(1, picture.image.shape[1] // 500)))
+        tried = [(self._coarse(picture, burnt, pitch_px), pitch_px) for pitch_px in pitches]
+        grooves, pitch_px = max(tried, key=lambda found: _edge_count(found[0]), default=([], 0.0))
+        columns = picture.image.shape[1]
+        return [
+            CoarseGroove(*(_by_column(course, columns) for course in (groove.outer, groove.inner)))
+            for groove in grooves
+        ], pitch_px
+
+    def _coarse(self, picture: StillPicture, burnt: int, pitch_px: float) -> list[CoarseGroove]:
+        """The coarse courses of grooves about so far apart."""
         rows, columns = picture.image.shape
-        pitch_px = groove_pitch_px(*block_means(picture, burnt, max(1, columns // 500)))
         block_px = int(np.clip(BLOCK_SHARE * pitch_px, 1, max(columns // 32, 1)))
         evidence = step_evidence(picture, self.appearance, pitch_px=pitch_px, burnt=burnt, block_px=block_px)
         courses = find_courses(
@@ -103,10 +113,7 @@ class EdgeCartridge:
             margin_px=round(MARGIN_SHARE * pitch_px),
             most=int(EDGES_A_PITCH * rows / pitch_px) + SPARE_COURSES,
         )
-        return [
-            CoarseGroove(*(_by_column(course, evidence.columns(), columns) for course in (groove.outer, groove.inner)))
-            for groove in choose_grooves(courses)
-        ], pitch_px
+        return choose_grooves(courses)
 
     def _sharpened(
         self, picture: StillPicture, groove: CoarseGroove, half_px: int, burnt: int
@@ -137,10 +144,16 @@ class EdgeCartridge:
         return Sketch(picture.image, tuple(lines))
 
 
-def _by_column(course: Course | None, middle: FloatArray, columns: int) -> Course | None:
-    """A course with a place for each column."""
+def _edge_count(grooves: list[CoarseGroove]) -> int:
+    return sum(edge is not None for groove in grooves for edge in (groove.outer, groove.inner))
+
+
+def _by_column(course: Course | None, columns: int) -> Course | None:
+    """A course with a place for each column, from one with a place for each block."""
     if course is None:
         return None
+    block_px = columns // course.row.size
+    middle = (np.arange(course.row.size) + 0.5) * block_px - 0.5
     return Course(course.wall, np.interp(np.arange(columns), middle, course.row), course.evidence)
 
 

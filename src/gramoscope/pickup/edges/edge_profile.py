@@ -12,12 +12,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline, make_smoothing_spline
+from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 from scipy.special import ndtr
 
 from gramoscope.conventions import BoolArray, FloatArray
 from gramoscope.pickup.edges.edge_band import EdgeBand
+from gramoscope.pickup.edges.likeness import shared_pixels
+from gramoscope.pickup.edges.steady_course import steady_course
 
 KNOT_PX = 0.5
 SOFT_STEP_PX = 1.0
@@ -26,6 +28,9 @@ AWAY_PX = 3.0
 """Land and wall are what lies farther from the edge than this."""
 LIGHT_COLUMNS, PATCH_COLUMNS = 40.0, 12.0
 """Standard deviations of the windows, in columns, over which the light, and land and wall, are averaged."""
+
+PATCHES_FROM = 1.5
+"""Land and wall are patchy where their means over a window scatter by more than this, squared, times what noise would do."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,12 +82,13 @@ def binned(place: FloatArray, value: FloatArray, weight: FloatArray, half_px: fl
 
 
 def _learned(place: FloatArray, value: FloatArray, weight: FloatArray, half_px: float) -> CubicSpline:
-    """The profile as a spline, as smooth as its means at the knots say (generalised cross-validation)."""
+    """The profile as a spline, as smooth as its means at the knots say (`steady_course`)."""
     mean, weights = binned(place, value, weight, half_px)
     knots = np.arange(mean.size) * KNOT_PX - half_px
     known = weights > 1e-3 * weights.max()
-    smooth = make_smoothing_spline(knots[known], mean[known], weights[known] / weights.max())
-    return CubicSpline(knots, smooth(np.clip(knots, knots[known][0], knots[known][-1])))
+    scatter = float((weight * (value - np.interp(place, knots, mean)) ** 2).sum() / max(weight.sum(), 1.0))
+    precision = np.where(known, weights / max(scatter, 1e-9), 0.0)
+    return CubicSpline(knots, steady_course(mean, precision).row)
 
 
 def learn_profile(band: EdgeBand, kept: BoolArray, *, line: bool = False) -> EdgeProfile:
@@ -109,7 +115,7 @@ def learn_profile(band: EdgeBand, kept: BoolArray, *, line: bool = False) -> Edg
     for _ in range(2):
         rest = (value - profile(place)) * weight
         sides = (land | wall, land | wall) if line else (land, wall)
-        on_land, on_wall = (_side(rest, weight * side) for side in sides)
+        on_land, on_wall = (_side(rest * side, weight * side) for side in sides)
         difference = on_land - on_wall
         patches = on_wall[:, None] + difference[:, None] * soft
         profile = _learned(place, value - patches, weight, half_px)
@@ -140,9 +146,14 @@ def _light(band: EdgeBand, weight: FloatArray, half_px: float) -> FloatArray:
 
 
 def _side(rest: FloatArray, weight: FloatArray) -> FloatArray:
+    """By how much land or wall differs from what it is elsewhere; what may be chance is not believed."""
     count = weight.sum(axis=1)
-    mean = np.where(count > 0, (rest * weight).sum(axis=1) / np.maximum(count, 1e-9), 0.0)
-    return along(mean, count, PATCH_COLUMNS)
+    mean = np.where(count > 0, rest.sum(axis=1) / np.maximum(count, 1e-9), 0.0)
+    patch = along(mean, count, PATCH_COLUMNS)
+    pixels = float(np.mean(count)) * 2 * np.sqrt(np.pi) * PATCH_COLUMNS
+    fine = rest - weight * patch[:, None]
+    chance = float((fine**2).sum() / max(weight.sum(), 1.0)) * shared_pixels(fine) / max(pixels, 1.0)
+    return patch if float(np.mean(patch**2)) > PATCHES_FROM * chance else np.zeros_like(patch)
 
 
 def _amplitude(value: FloatArray, shape: FloatArray, weight: FloatArray) -> FloatArray:
@@ -157,9 +168,9 @@ def _amplitude(value: FloatArray, shape: FloatArray, weight: FloatArray) -> Floa
 def _middle(profile: CubicSpline, half_px: float, *, line: bool) -> float:
     """Where the edge lies in the middle half of its profile: the centre of the peak of its slope, or of the line."""
     fine = np.linspace(-0.5 * half_px, 0.5 * half_px, 401)
-    height = np.abs(profile(fine) - np.median(profile(fine))) if line else np.abs(profile(fine, 1))
-    above = np.maximum(height - 0.5 * height.max(), 0.0)
+    height = (profile(fine) - np.median(profile(fine)) if line else profile(fine, 1)) ** 2
+    peak = height > 0.1 * height.max()
     # the peak that holds the maximum, and no other
-    runs = np.cumsum(np.diff(above > 0, prepend=above[0] > 0))
-    above[runs != runs[int(np.argmax(height))]] = 0.0
+    runs = np.cumsum(np.diff(peak, prepend=peak[0]))
+    above = np.where(runs == runs[int(np.argmax(height))], height, 0.0)
     return float(np.average(fine, weights=above)) if above.any() else 0.0

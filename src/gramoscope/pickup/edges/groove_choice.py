@@ -15,12 +15,12 @@ import numpy as np
 from gramoscope.conventions import INNER, OUTER
 from gramoscope.pickup.edges.courses import Course
 
-EDGES_FROM = 0.6
-"""A course that collects less than this share of what the best one does is no edge, whatever the gaps."""
-CLEAR = 3.0
-"""Courses that all collect more are all edges: chance collects half of it at the most."""
+CHANCE, CERTAINTY = 2.0, 2.8
+"""Evidence, in standard deviations, below which all is chance, and above which all is edges."""
 LEAST_GAP = 0.1
 """A narrower gap, in standard deviations of the evidence, tells nothing from nothing."""
+HALF_GROOVE, WHOLE_GROOVE = 0.7, 0.25
+"""Two neighbours narrower than this share of the usual width, and as wide together but for this share, are one groove."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +36,12 @@ def least_evidence(courses: Sequence[Course]) -> float:
     evidence = np.sort([course.evidence for course in courses])[::-1]
     if evidence.size < 2:
         return float("inf")
-    gap = np.where(evidence[:-1] >= EDGES_FROM * evidence[0], -np.diff(evidence), 0.0)
+    middle = 0.5 * (evidence[:-1] + evidence[1:])
+    gap = np.where((evidence[:-1] >= CHANCE) & (evidence[1:] <= CERTAINTY), -np.diff(evidence), 0.0)
     widest = int(np.argmax(gap))
     if gap[widest] < LEAST_GAP:
-        # a clean picture: nothing wanders, for there is nothing else to collect
-        return EDGES_FROM * float(evidence[0]) if evidence[-1] >= CLEAR else float("inf")
-    return float(0.5 * (evidence[widest] + evidence[widest + 1]))
+        return float("inf")
+    return float(middle[widest])
 
 
 def taking_turns(courses: Sequence[Course], least: float) -> list[Course]:
@@ -84,4 +84,27 @@ def pair(edges: Sequence[Course]) -> list[CoarseGroove]:
 def choose_grooves(courses: Sequence[Course]) -> list[CoarseGroove]:
     """Return the grooves among coarse courses, by growing row; none where no course stands out."""
     least = least_evidence(courses)
-    return pair(taking_turns(courses, least)) if np.isfinite(least) else []
+    return mended(pair(taking_turns(courses, least))) if np.isfinite(least) else []
+
+
+def mended(grooves: Sequence[CoarseGroove]) -> list[CoarseGroove]:
+    """Return grooves, those that something bright along their bottom has torn in two mended."""
+    widths = np.array([_width(groove) for groove in grooves])
+    usual = float(np.nanmedian(widths)) if np.isfinite(widths).any() else np.nan
+    whole: list[CoarseGroove] = []
+    for groove in grooves:
+        if whole:
+            both = CoarseGroove(whole[-1].outer, groove.inner)
+            halves = max(_width(whole[-1]), _width(groove)) < HALF_GROOVE * usual
+            if halves and abs(_width(both) - usual) < WHOLE_GROOVE * usual:
+                whole[-1] = both
+                continue
+        whole.append(groove)
+    return whole
+
+
+def _width(groove: CoarseGroove) -> float:
+    """Rows from edge to edge; NaN for a groove with one edge."""
+    if groove.outer is None or groove.inner is None:
+        return float("nan")
+    return float(np.median(groove.inner.row - groove.outer.row))

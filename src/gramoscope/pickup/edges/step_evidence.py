@@ -15,7 +15,7 @@ import numba
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from gramoscope.conventions import BoolArray, Float32Array, FloatArray
+from gramoscope.conventions import BoolArray, Float32Array
 from gramoscope.pickup.edges.appearance import Appearance
 from gramoscope.signal_path import StillPicture
 
@@ -46,10 +46,6 @@ class StepEvidence:
     outer: Float32Array
     inner: Float32Array
     block_px: int
-
-    def columns(self) -> FloatArray:
-        """Return the middle column of each block."""
-        return (np.arange(self.outer.shape[0]) + 0.5) * self.block_px - 0.5
 
 
 def burnt_level(picture: StillPicture, burnt_share: float) -> int:
