@@ -17,7 +17,7 @@ from gramoscope.conventions import FloatArray
 from gramoscope.signal_path import GrooveEdges, StillPicture, Texture
 from gramoscope.tonearm.splice import Match
 from gramoscope.tonearm.stitch import Stitch
-from gramoscope.tonearm.turns import NEAR_PX, GrooveEnds, continued
+from gramoscope.tonearm.turns import NEAR_PX, GrooveEnds, continued, half_spacing, levels_of, nearest_level
 
 
 @dataclass(frozen=True)
@@ -91,6 +91,8 @@ class RowOfPictures:
     _chains: list[list[Stretch]] = field(default_factory=list)
     _going_on: dict[int, int] = field(default_factory=dict)
     _joins: dict[int, int] = field(default_factory=dict)
+    _waiting: dict[int, float] = field(default_factory=dict)
+    _late: dict[int, float] = field(default_factory=dict)
     _first: Looked | None = None
     _before: Looked | None = None
     _place_m: tuple[float, float] = (0.0, 0.0)
@@ -177,16 +179,33 @@ class RowOfPictures:
         if self._before is not None:
             before, after = self._ends(self._before), self._ends(looked, head=True)
             linked = {there: here for here, there in enumerate(continued(before, after)) if there is not None}
+            self._wait(before, {*linked.values()})
+        levels = levels_of(self._ends(looked, head=True).row_px)
         going_on = {}
         for groove in range(looked.grooves):
-            chain = self._going_on.get(linked.get(groove, -1), len(self._chains))
+            chain = self._going_on.get(linked.get(groove, -1), self._found_again(float(levels[groove]), levels))
             if chain == len(self._chains):
                 self._chains.append([])
+                if self._before is not None:
+                    self._late[chain] = float(levels[groove])
             unmatched = match is not None and bool(np.isnan(match.error_m))
             self._chains[chain].append(Stretch(looked.number, groove, arc_m, lateral_m, looked.columns, unmatched))
             going_on[groove] = chain
         self._going_on = going_on
         self._last_place_m = self._place_m
+
+    def _wait(self, before: GrooveEnds, linked: set[int]) -> None:
+        """Remember where grooves ran that the next picture does not show: the one after it may."""
+        levels = levels_of(before.row_px)
+        self._waiting |= {self._going_on[k]: float(levels[k]) for k in self._going_on if k not in linked}
+
+    def _found_again(self, level: float, levels: FloatArray) -> int:
+        """The chain that waits where a groove begins, or a new one."""
+        near = nearest_level(level, self._waiting, half_spacing(levels))
+        if near is None:
+            return len(self._chains)
+        del self._waiting[near]
+        return near
 
     def _ends(self, looked: Looked, *, head: bool = False) -> GrooveEnds:
         """The edges at an end of a picture, in the frame of the row: of the new one, or of the one before."""
@@ -214,9 +233,20 @@ class RowOfPictures:
         )
         after = GrooveEnds(int(np.rint(turn)), self._first.head_row_px + self.turn_drift_m / pitch_m)
         starts = {chain[0].groove: k for k, chain in enumerate(self._chains) if chain[0].picture == self._first.number}
-        for here, there in enumerate(continued(before, after)):
+        links = continued(before, after)
+        for here, there in enumerate(links):
             if there is not None and starts[there] != self._going_on[here]:
                 self._joins[self._going_on[here]] = starts[there]
+        # grooves that were missed at an end of the turn: where they were seen last, and seen first
+        ends, begins = levels_of(before.row_px), levels_of(after.row_px)
+        self._waiting |= {self._going_on[k]: float(ends[k]) for k, there in enumerate(links) if there is None}
+        late = {chain: level + self.turn_drift_m / pitch_m for chain, level in self._late.items()}
+        late |= {starts[k]: float(begins[k]) for k in starts if starts[k] not in self._joins.values()}
+        for chain, level in sorted(self._waiting.items()):
+            next_one = nearest_level(level, {k: v for k, v in late.items() if k != chain}, half_spacing(ends))
+            if next_one is not None:
+                self._joins[chain] = next_one
+                del late[next_one]
 
     @property
     def turn_drift_m(self) -> float:

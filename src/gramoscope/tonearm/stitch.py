@@ -36,12 +36,16 @@ class Stitch:
         Overlaps narrower than this are not believed.
     least_correlation : float
         Nor are matches worse than this.
+    sure_px : float
+        A match that is nearer to the nominal step than this says that it is the nominal one: over many turns a hundredth of
+        a pixel would add up.
     """
 
     reach_px: int = 24
     row_reach_px: int = 12
     least_overlap_px: int = 24
     least_correlation: float = 0.4
+    sure_px: float = 0.03
 
     def __post_init__(self) -> None:
         require(self.reach_px >= 1, f"a reach of {self.reach_px} pixels", "at least 1")
@@ -89,7 +93,13 @@ class Stitch:
             least_overlap_px=self.least_overlap_px,
             least_correlation=self.least_correlation,
         )
-        return splice.match(_of_rows(before, rows), _of_rows(after, rows))
+        match = splice.match(_of_rows(before, rows), _of_rows(after, rows))
+        within = self.sure_px * before.pixel_pitch_m
+        return Match(_beyond(match.error_m, within), match.correlation, _beyond(match.row_error_m, within))
+
+
+def _beyond(error_m: float, within_m: float) -> float:
+    return 0.0 if abs(error_m) < within_m else error_m
 
 
 def _derivative(picture: StillPicture, start: int, stop: int) -> npt.NDArray[np.float32]:

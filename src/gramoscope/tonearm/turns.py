@@ -96,3 +96,27 @@ def _spacing(before: GrooveEnds, after: GrooveEnds) -> float:
         return float(np.median(known))
     known = widths[np.isfinite(widths)]
     return float(known.max()) if known.size else 0.0
+
+
+def levels_of(row_px: FloatArray) -> FloatArray:
+    """Return about which row each groove runs, the median over what is seen of its walls; NaN where nothing is.
+
+    Parameters
+    ----------
+    row_px : float64 array, shape (groove, 2, column)
+    """
+    medians = _median(row_px)
+    return np.array([np.mean(level[np.isfinite(level)]) if np.isfinite(level).any() else np.nan for level in medians])
+
+
+def half_spacing(levels: FloatArray) -> float:
+    """Return half the usual distance of neighbouring grooves; 0 where there are not two."""
+    steps = np.diff(np.sort(levels[np.isfinite(levels)]))
+    return float(np.median(steps)) / 2 if steps.size else 0.0
+
+
+def nearest_level(level: float, levels: Mapping[int, float], limit: float) -> int | None:
+    """Return which of some levels is nearest, if it is nearer than the limit."""
+    known = {key: abs(one - level) for key, one in levels.items() if np.isfinite(one)}
+    best = min(known, key=lambda key: known[key], default=None)
+    return best if best is not None and known[best] < limit else None

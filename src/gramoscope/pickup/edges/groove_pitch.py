@@ -35,9 +35,9 @@ def row_autocorrelation(level: Float32Array) -> FloatArray:
     rows = level.shape[1]
     # the light may fall off across the grooves: what is left after a parabola repeats, or does not
     place = np.linspace(-1, 1, rows)
-    centred = level - np.polynomial.polynomial.polyval(place, np.polynomial.polynomial.polyfit(place, level.T, 2)).astype(
-        np.float32
-    )
+    centred = level - np.polynomial.polynomial.polyval(
+        place, np.polynomial.polynomial.polyfit(place, level.T, 2)
+    ).astype(np.float32)
     spectrum = np.abs(np.fft.rfft(centred, 2 * rows, axis=1)) ** 2
     shifts = max(rows * 2 // 3, 1)
     power = np.fft.irfft(spectrum.sum(axis=0))[:shifts] / np.arange(rows, rows - shifts, -1)
