@@ -54,13 +54,21 @@ def grooves_of(passage: Passage, start: int, stop: int) -> tuple[GrooveEdges, ..
 
 
 def looked_through(
-    passage: Passage, starts: list[int], width: int, *, nominal: Row, lost: int | None = None
+    passage: Passage,
+    starts: list[int],
+    width: int,
+    *,
+    nominal: Row,
+    lost: int | None = None,
+    missed: tuple[int, int] | None = None,
+    raised: int = 0,
 ) -> tuple[RowOfPictures, dict[tuple[int, int], GrooveEdges]]:
     row = RowOfPictures(bench(nominal.pictures, nominal.step_px, nominal.turn_px), Stitch())
     edges = {}
     for number, start in enumerate(starts):
         stop = min(start + width, SCENE.columns)
-        image = still_picture(SCENE, passage, start, stop)
+        # each picture shows everything so many rows higher than the one before
+        image = still_picture(SCENE, passage, start, stop)[number * raised :]
         picture = StillPicture(
             number=number,
             image=image,
@@ -74,7 +82,10 @@ def looked_through(
             black = replace(picture, image=np.zeros_like(image), seen=np.zeros(image.shape, np.bool_))
             row.add(row.looked(black, ()))
             continue
-        found = grooves_of(passage, start, stop)
+        found = tuple(replace(one, row_px=one.row_px - number * raised) for one in grooves_of(passage, start, stop))
+        if missed is not None and missed[0] == number:
+            kept = [one for one in found if one.number != missed[1]]
+            found = tuple(replace(one, number=k) for k, one in enumerate(kept))
         edges |= {(number, one.number): one for one in found}
         row.add(row.looked(picture, found))
     return row, edges
@@ -162,3 +173,25 @@ def test_pictures_of_other_places_are_not_matched(passage: Passage) -> None:
     row, _ = looked_through(passage, [0, 500], 300, nominal=Row(2, 200.0))
     assert np.isnan(row.matches[0].error_m)
     assert "could not be laid" in row.problems[0]
+
+
+@pytest.mark.parametrize("missed", [(1, 4), (0, 5), (2, 3)])
+def test_a_groove_that_one_picture_misses_is_found_again(passage: Passage, missed: tuple[int, int]) -> None:
+    """In the middle of the row, where the turn begins, and where it ends: the passage goes on, with a gap."""
+    row, edges = looked_through(passage, [0, 340, 680], 400, nominal=Row(3, 340.0, TURN_PX), missed=missed)
+    (stretches,) = row.passages()
+    assert len(stretches) == 3 * (TURNS + 1) - 1
+    arc, lateral = course(stretches, edges)
+    assert np.abs(lateral - truth(passage, arc)).max() < 0.2
+    gaps = np.diff([one.arc_start_m / SCENE.pixel_pitch_m for one in stretches])
+    assert np.count_nonzero(gaps > 500) == 1
+
+
+def test_a_stage_that_drifts_across_is_followed(passage: Passage) -> None:
+    """Over a whole turn too: each turn starts where the last one ended."""
+    row, edges = looked_through(passage, [0, 340, 680], 400, nominal=Row(3, 340.0, TURN_PX), raised=3)
+    (stretches,) = row.passages()
+    assert len(stretches) == 3 * (TURNS + 1)
+    arc, lateral = course(stretches, edges)
+    assert row.turn_drift_m / SCENE.pixel_pitch_m == pytest.approx(0.0, abs=0.1)
+    assert np.abs(lateral - truth(passage, arc)).max() < 0.3
