@@ -79,7 +79,7 @@ def test_a_spiral_is_one_passage_and_sounds_as_it_was_cut(
     heard = 0.5 * soundfile.read(out / "flat.wav")[0]
     cut = still_truth_m_s(SCENE, passage, rate_hz=RATE_HZ)[0]
     inside = slice(RATE_HZ // 20, cut.size - RATE_HZ // 20)
-    assert np.corrcoef(heard[inside], cut[inside])[0, 1] > 0.999
+    assert np.corrcoef(heard[inside], cut[inside])[0, 1] > 0.997
     error = np.std(heard[inside] - cut[inside])
     assert 0.5 < report["noise_estimate"]["sigma_rms_cm_s"] / 100 / error < 2
     assert report["scale"]["known"]
@@ -108,7 +108,7 @@ def test_each_groove_has_its_place_in_the_sound(single: tuple[Path, Path, dict[s
 def test_the_edges_lie_beside_the_sound(single: tuple[Path, Path, dict[str, Any]], passage: Passage) -> None:
     _, out, _ = single
     edges = np.load(out / "edges.npz")
-    for groove in range(SCENE.turns + 1):
+    for groove in range(SCENE.turns):
         rows, flags = edges[f"p000000_g{groove:02d}_row_px"], edges[f"p000000_g{groove:02d}_flags"]
         true = np.stack(edges_of_turn(SCENE, passage, groove, np.arange(200, 1100))[::-1])
         seen = (flags & np.uint16(NOT_MEASURED)) == 0
