@@ -71,7 +71,10 @@ def test_noise_that_neighbours_share_makes_larger_errors(photograph: Make) -> No
     grooves = CARTRIDGE.find(drawn.still())
     # taken for independent the errors would be claimed 2.5 times too small
     assert 0.8 < np.sqrt(np.mean(_pulls(grooves, drawn.edges()) ** 2)) < 1.4
-    assert grooves[0].correlation_samples > CARTRIDGE.find(replace(drawn, noise_blur_px=0.0).still())[0].correlation_samples
+    assert (
+        grooves[0].correlation_samples
+        > CARTRIDGE.find(replace(drawn, noise_blur_px=0.0).still())[0].correlation_samples
+    )
 
 
 def test_columns_keep_to_themselves_when_told_so(photograph: Make) -> None:
@@ -86,7 +89,9 @@ def test_columns_keep_to_themselves_when_told_so(photograph: Make) -> None:
 def test_dust_is_flagged_and_bridged(photograph: Make) -> None:
     drawn = photograph(columns=600)
     true = drawn.edges()
-    dust = tuple((true[n, wall, at], float(at), 8.0) for n, wall, at in ((0, OUTER, 150), (1, INNER, 300), (2, OUTER, 450)))
+    dust = tuple(
+        (true[n, wall, at], float(at), 8.0) for n, wall, at in ((0, OUTER, 150), (1, INNER, 300), (2, OUTER, 450))
+    )
     grooves = CARTRIDGE.find(drawn.still(dust=dust))
     for n, wall, at in ((0, OUTER, 150), (1, INNER, 300), (2, OUTER, 450)):
         covered = slice(at - 7, at + 8)
@@ -109,7 +114,9 @@ def test_a_mirrored_picture_gives_mirrored_edges(photograph: Make, picture_of: M
 
 def test_reversed_columns_give_reversed_edges(photograph: Make, picture_of: Make) -> None:
     picture = photograph().still()
-    for one, other in zip(CARTRIDGE.find(picture), CARTRIDGE.find(picture_of(picture.image[:, ::-1].copy())), strict=True):
+    for one, other in zip(
+        CARTRIDGE.find(picture), CARTRIDGE.find(picture_of(picture.image[:, ::-1].copy())), strict=True
+    ):
         np.testing.assert_allclose(one.row_px, other.row_px[:, ::-1], atol=0.03)
 
 

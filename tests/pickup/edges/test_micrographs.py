@@ -68,7 +68,9 @@ def test_800_hz_on_one_wall_and_3000_hz_on_the_other(micrograph: Make, picture_o
     def unexplained(rates: FloatArray) -> float:
         return -sum(_fit(places, *(rates / 1000))[1] for mine in edges.values() for places in mine)
 
-    slow, fast = minimize(unexplained, [1000 / 154.5, 1000 / 40.8], method="Nelder-Mead", options={"xatol": 1e-3}).x / 1000
+    slow, fast = (
+        minimize(unexplained, [1000 / 154.5, 1000 / 40.8], method="Nelder-Mead", options={"xatol": 1e-3}).x / 1000
+    )
     assert fast / slow == pytest.approx(3000 / 800, rel=0.02)
     tones = {wall: np.array([_fit(places, slow, fast)[0] for places in mine]) for wall, mine in edges.items()}
     # in step with the same tone of the other wall, all grooves together
@@ -92,7 +94,9 @@ def test_writing_and_dust_at_full_scale_get_no_weight(micrograph: Make, picture_
 
 def _resized(image: np.ndarray, scale: float) -> np.ndarray:  # type: ignore[type-arg]
     height, width = image.shape
-    return np.asarray(Image.fromarray(image).resize((round(width * scale), round(height * scale)), Image.Resampling.BILINEAR))
+    return np.asarray(
+        Image.fromarray(image).resize((round(width * scale), round(height * scale)), Image.Resampling.BILINEAR)
+    )
 
 
 @pytest.mark.parametrize(("name", "whole"), [("track_05", 6), ("track_09", 6)])

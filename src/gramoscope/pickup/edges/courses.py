@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-
 from gramoscope.conventions import INNER, OUTER, Float32Array, FloatArray
 from gramoscope.pickup.edges.step_evidence import UNKNOWN, StepEvidence
 

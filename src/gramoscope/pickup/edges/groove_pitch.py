@@ -13,7 +13,7 @@ from gramoscope.conventions import Float32Array, FloatArray
 MOST_COLUMNS = 4000
 LEAST_PITCH_PX = 12
 NEARLY_HIGHEST = (0.6, 0.35)
-"""A peak that is not the highest may be the pitch and the highest a multiple of it: the first peaks of these shares are tried."""
+"""The pitch need not be the highest peak, which may be a multiple of it: the first peaks of these shares of it are tried."""
 LEAST_LIKENESS = 0.05
 """A correlation below this is no likeness."""
 LONE_GROOVE = (0.75, 0.4, 0.2)
@@ -35,9 +35,9 @@ def row_autocorrelation(level: Float32Array) -> FloatArray:
     rows = level.shape[1]
     # the light may fall off across the grooves: what is left after a parabola repeats, or does not
     place = np.linspace(-1, 1, rows)
-    centred = level - np.polynomial.polynomial.polyval(place, np.polynomial.polynomial.polyfit(place, level.T, 2)).astype(
-        np.float32
-    )
+    centred = level - np.polynomial.polynomial.polyval(
+        place, np.polynomial.polynomial.polyfit(place, level.T, 2)
+    ).astype(np.float32)
     spectrum = np.abs(np.fft.rfft(centred, 2 * rows, axis=1)) ** 2
     shifts = max(rows * 2 // 3, 1)
     power = np.fft.irfft(spectrum.sum(axis=0))[:shifts] / np.arange(rows, rows - shifts, -1)
