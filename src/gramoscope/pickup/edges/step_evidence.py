@@ -62,7 +62,7 @@ def spread_sample(values: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
 
 def _logarithms(picture: StillPicture, burnt: int) -> Float32Array:
     """The logarithm of each pixel value, as a table; NaN for burnt ones."""
-    value = spread_sample(picture.image)[spread_sample(picture.seen)]
+    value = spread_sample(picture.image)[spread_sample(picture.seen)].astype(np.float64)
     shadow = SHADOW * float(np.median(value)) if value.size else 1.0
     table = np.log(np.arange(np.iinfo(picture.image.dtype).max + 1) + max(shadow, 1e-3))
     table[burnt:] = np.nan
