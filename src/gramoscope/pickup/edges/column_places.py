@@ -73,7 +73,7 @@ def column_places(band: EdgeBand, profile: EdgeProfile, kept: BoolArray, *, dust
     for _ in range(2):
         after = rest - profile.gradient * step[:, None]
         dust = band.usable & (np.abs(after) > dust_gate * noise)
-        kept = band.usable & ~binary_dilation(dust, np.ones((3, 3)))
+        kept = band.usable & ~binary_dilation(dust, np.ones((3, 3), np.bool_))
         noise = _noise(band, after, profile.gradient, noise, kept)
         step, gain, whole = _steps(rest, profile.gradient, noise, kept)
     after = np.where(kept, (rest - profile.gradient * step[:, None]) / noise, 0.0)

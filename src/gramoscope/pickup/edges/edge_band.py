@@ -84,7 +84,7 @@ def _with_halo(burnt: BoolArray) -> BoolArray:
     """Burnt pixels and those that they spoil: a few about specks and writing, more about blobs."""
     if not burnt.any():
         return burnt
-    blobs = binary_erosion(burnt, np.ones((BLOB_PX, BLOB_PX)))
+    blobs = binary_erosion(burnt, np.ones((BLOB_PX, BLOB_PX), np.bool_))
     # a filter of squares goes row by row and column by column, where a dilation goes through the square
     halo, glare = (
         maximum_filter(part.view(np.uint8), 2 * reach + 1) for part, reach in ((burnt, HALO_PX), (blobs, GLARE_PX))

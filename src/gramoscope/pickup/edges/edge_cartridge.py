@@ -83,7 +83,7 @@ class EdgeCartridge:
         grooves, pitch_px = self.coarse(picture, burnt)
         low, high = HALF_BAND_PX
         half_px = int(np.clip(round(HALF_BAND_SHARE * pitch_px), low, high))
-        found = []
+        found = list[GrooveEdges]()
         for groove in grooves:
             sharp = self._sharpened(picture, groove, half_px, burnt)
             if any(edge is not None for edge in sharp):

@@ -137,7 +137,7 @@ def learn_profile(band: EdgeBand, kept: BoolArray, *, line: bool = False) -> Edg
 
 def _light(band: EdgeBand, weight: FloatArray, half_px: float) -> FloatArray:
     """The strength of the light along the course: regression on what is usual at each place across the edge."""
-    usual, _ = binned(band.from_edge_px, band.level, weight, half_px)
+    usual, _ = binned(band.from_edge_px, band.level.astype(np.float64), weight, half_px)
     expected = np.interp(band.from_edge_px, np.arange(usual.size) * KNOT_PX - half_px, usual)
     power = (weight * expected**2).sum(axis=1)
     strength = (weight * expected * np.minimum(band.level, 2 * expected)).sum(axis=1) / np.maximum(power, 1e-12)

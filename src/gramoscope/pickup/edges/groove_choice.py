@@ -90,7 +90,8 @@ def choose_grooves(courses: Sequence[Course]) -> list[CoarseGroove]:
 def mended(grooves: Sequence[CoarseGroove]) -> list[CoarseGroove]:
     """Return grooves, those that something bright along their bottom has torn in two mended."""
     widths = np.array([_width(groove) for groove in grooves])
-    usual = float(np.nanmedian(widths)) if np.isfinite(widths).any() else np.nan
+    # torn ones are few, and narrower: what is usual lies above the middle
+    usual = float(np.nanquantile(widths, 0.75)) if np.isfinite(widths).any() else np.nan
     whole: list[CoarseGroove] = []
     for groove in grooves:
         if whole:

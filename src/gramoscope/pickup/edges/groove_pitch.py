@@ -13,7 +13,7 @@ from gramoscope.conventions import Float32Array, FloatArray
 MOST_COLUMNS = 4000
 LEAST_PITCH_PX = 12
 NEARLY_HIGHEST = (0.6, 0.35)
-"""A peak that is not the highest may be the pitch and the highest a multiple of it: the first peaks of these shares are tried."""
+"""The pitch need not be the highest peak, which may be a multiple of it: the first peaks of these shares of it are tried."""
 LEAST_LIKENESS = 0.05
 """A correlation below this is no likeness."""
 LONE_GROOVE = (0.75, 0.4, 0.2)

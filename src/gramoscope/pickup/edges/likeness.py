@@ -11,7 +11,7 @@ LAGS = 6
 
 
 def likeness(rest: FloatArray) -> FloatArray:
-    """Return how noise in units of itself, 0 where unknown, correlates with itself 0 … `LAGS` − 1 further along the first axis."""
+    """Return how noise correlates with itself 0 … `LAGS` − 1 further along the first axis; it is 0 where unknown."""
     known = rest != 0
     power = float((rest**2).sum()) / max(int(known.sum()), 1)
     found = np.zeros(LAGS)

@@ -1,7 +1,8 @@
 """The smooth course through places with errors, as smooth as the places themselves say.
 
 Third differences of the course are taken for independent with one variance 1/λ, and the places for the course plus errors
-of variance s²/w, with s² at least one: places may scatter more than their errors say, not less. Then the course of greatest probability is that of Whittaker and Henderson,
+of variance s²/w, with s² at least one: places may scatter more than their errors say, not less. Then the course of greatest
+probability is that of Whittaker and Henderson,
 
     (W + κ D'D) x = W y,       κ = λ s²,
 
@@ -97,7 +98,7 @@ def steady_course(row: FloatArray, weight: FloatArray, *, stiffness: float | Non
     origin = float(np.average(place, weights=weight))
     place = np.where(weight > 0, place - origin, 0.0)
     scale = float(np.median(weight[weight > 0]))
-    free = max(np.count_nonzero(weight) - ORDER, 1)
+    free = max(int(np.count_nonzero(weight)) - ORDER, 1)
 
     def solved(stiffness: float) -> tuple[FloatArray, FloatArray, float]:
         matrix = stiffness * roughness

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
+import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d
 
-from gramoscope.conventions import BoolArray, Float32Array
+from gramoscope.conventions import BoolArray, Float32Array, Scalar
 from gramoscope.pickup.edges.appearance import Appearance
 from gramoscope.signal_path import StillPicture
 
@@ -53,7 +54,7 @@ def burnt_level(picture: StillPicture, burnt_share: float) -> int:
     return max(1, int(np.ceil(burnt_share * picture.white_level)))
 
 
-def spread_sample(values: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+def spread_sample(values: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
     """Return evenly spread values of an array, at most about `SAMPLE_PIXELS`; a view."""
     step = int(np.ceil(np.sqrt(max(values.size / SAMPLE_PIXELS, 1.0))))
     return values[::step, ::step]
@@ -61,11 +62,11 @@ def spread_sample(values: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
 
 def _logarithms(picture: StillPicture, burnt: int) -> Float32Array:
     """The logarithm of each pixel value, as a table; NaN for burnt ones."""
-    value = spread_sample(picture.image)[spread_sample(picture.seen)]
+    value = spread_sample(picture.image)[spread_sample(picture.seen)].astype(np.float64)
     shadow = SHADOW * float(np.median(value)) if value.size else 1.0
     table = np.log(np.arange(np.iinfo(picture.image.dtype).max + 1) + max(shadow, 1e-3))
     table[burnt:] = np.nan
-    return table.astype(np.float32)
+    return np.asarray(table, np.float32)
 
 
 @numba.njit(cache=True, nogil=True)

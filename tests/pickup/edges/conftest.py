@@ -1,15 +1,21 @@
-"""Photographs of grooves whose edges are known: soft steps of light, drawn at their true places to a fraction of a pixel."""
+"""Photographs of grooves whose edges are known, drawn at their true places to a fraction of a pixel; and practice ones."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+import pytest
+from PIL import Image
 from scipy.ndimage import gaussian_filter
 from scipy.special import ndtr
 
 from gramoscope.conventions import INNER, OUTER, FloatArray
 from gramoscope.signal_path import StillPicture
+
+MICROGRAPHS = Path(__file__).parents[3].parent / "shared" / "data" / "micrographs"
 
 
 @dataclass(frozen=True)
@@ -83,3 +89,29 @@ class Photograph:
 def still(image: np.ndarray, *, pixel_pitch_m: float = 1e-6, white_level: int = 255) -> StillPicture:  # type: ignore[type-arg]
     """A picture all of which is seen."""
     return StillPicture(0, image, 0.0, 0.0, pixel_pitch_m, white_level, np.ones(image.shape, np.bool_))
+
+
+@pytest.fixture
+def photograph() -> Callable[..., Photograph]:
+    """Makes photographs."""
+    return Photograph
+
+
+@pytest.fixture
+def picture_of() -> Callable[..., StillPicture]:
+    """Makes a picture of grey levels."""
+    return still
+
+
+@pytest.fixture
+def micrograph() -> Callable[[str], np.ndarray]:  # type: ignore[type-arg]
+    """Grey levels of a practice micrograph, turned so that its grooves run along the columns."""
+
+    def grey(name: str) -> np.ndarray:  # type: ignore[type-arg]
+        path = MICROGRAPHS / f"{name}.png"
+        if not path.is_file():
+            pytest.skip("the micrographs are not beside the repository (shared/data/micrographs)")
+        with Image.open(path) as image:
+            return np.ascontiguousarray(np.asarray(image)[..., 0].T)
+
+    return grey
