@@ -30,10 +30,13 @@ HEAD = """# Photographs, measured
 
     python -m benchmarks.accuracy.stills --table benchmarks/accuracy/stills.md
 
-Spirals drawn by the simulator (`gramoscope.simulation.still`: everything in focus, grain, dust, noise of the camera), cut with the sound of the demonstration (a singer over bells, 150 Hz … 6 kHz, 3 cm/s rms)
-at 78 rpm, written as a row of overlapping pictures and played by the recipe `stills`: edges found, pictures laid on each other, all turns joined. Against the velocity that was cut, sample by sample, nothing aligned or
-scaled, full band at 48 kHz; the first and last 20 ms are left out. *r*: Pearson's; *SNR*: of the sound against its error; *claimed ÷ real*: rms of the error bars over that of the error, where measured. *pixels a second* pass
-under the stylus: half of them is the highest frequency there could be.
+Spirals drawn by the simulator (`gramoscope.simulation.still`: everything in focus, grain, dust, noise of the camera), cut
+with the sound of the demonstration (a singer over bells, 150 Hz … 6 kHz, 3 cm/s rms unless said otherwise) at 78 rpm,
+written as a row of overlapping pictures and played by the recipe `stills`: edges found, pictures laid on each other, all
+turns joined. Against the velocity that was cut, sample by sample, nothing aligned or scaled, full band at 48 kHz; the first
+and last 20 ms are left out. *r*: Pearson's; *SNR*: of the sound against its error; *claimed ÷ real*: rms of the error bars
+over that of the error, where measured. *pixels a second* pass under the stylus: half of them is the highest frequency there
+could be.
 
 | photograph | turns | pictures | pixels a second | r | SNR dB | claimed ÷ real | measured |
 |---|---|---|---|---|---|---|---|

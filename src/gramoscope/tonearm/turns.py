@@ -6,6 +6,7 @@ groove that ends as number k is the one that starts as number k + 1, because a s
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
