@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 import soundfile
 
-COMMAND = [sys.executable, "-c", "import sys; from gramoscope.cli.main import main; sys.exit(main())"]
+COMMAND = [sys.executable, "-m", "gramoscope"]
 PATIENCE_S = 60.0
 
 

@@ -72,22 +72,48 @@ def test_it_can_be_made_again_from_the_file(html: str, transfer: Any) -> None:
     assert worst.sub("", again) == worst.sub("", html)
 
 
-def test_what_curves_find_of_the_speed_has_its_place(transfer: Any) -> None:
-    told = {
-        **transfer.report,
-        "speed": {"rpm": 78.26},
-        "wow": {"hole": {"percent": 0.31}},
-        "hints": {"hum": {"words": "50 Hz"}},
+def test_speed_wow_and_hints_are_told_in_words(transfer: Any) -> None:
+    words = _Page(quality_page(transfer.report, [])).words
+    assert "playing speed78 rpm, as the capture says" in words
+    assert "off-centre holenot known: the passage covers" in words
+    assert "hint of mains humnone: too short" in words
+    assert "removal of the wow" not in words
+    wow = {
+        **transfer.report["wow"],
+        **dict.fromkeys(("amplitude_um", "percent", "phase_deg", "pitch_um"), 12.3),
+        **dict.fromkeys(("amplitude_sigma_um", "sigma_percent", "phase_sigma_deg", "pitch_sigma_um"), 0.42),
+        "determined": True,
+        "removal": {"asked": True, "applied": True, "survey": None},
     }
-    words = _Page(quality_page({**told, "repair": {"history": ["declicked", "rumble below 20 Hz"]}}, [])).words
+    chosen = {"rpm": 78.2609, "chosen": "78-us", "origin": "60 Hz mains", "capture_rpm": 78.0, "curve": None}
+    hints = {"mains_hum": {"words": "a steady line"}, "tuning": {"words": "sharp"}}
+    words = _Page(quality_page({**transfer.report, "speed": chosen, "wow": wow, "hints": hints}, [])).words
     for said in (
-        "speed, rpm78.26",
-        "wow, hole, percent0.31",
-        "hints, hum, words50 Hz",
-        "declicked; rumble below 20 Hz",
+        "playing speed78.261 rpm, chosen as 78-us (60 Hz mains); the capture says 78",
+        "off-centre hole12.3 ± 0.42 µm off",
+        "its wow, peak12.3 ± 0.42 %",
+        "removal of the wowasked for, and done",
+        "hint of mains huma steady line",
+        "hint of the tuningsharp",
     ):
         assert said in words
-    assert "nothing was repaired" in _Page(quality_page(transfer.report, [])).words
+
+
+def test_repairs_are_told_by_their_kind(transfer: Any) -> None:
+    repair = {
+        "history": ["clicks", "rumble below 20 Hz"],
+        "spans": {"declick": 3, "rumble": 1, "interpolated": 2},
+        "seconds": {"declick": 0.0042, "rumble": 0.016, "interpolated": 0.001},
+    }
+    words = _Page(quality_page({**transfer.report, "repair": repair}, [])).words
+    assert "repaired: clicks; rumble below 20 Hz" in words
+    assert "clicks replaced34.2 ms" in words
+    assert "bridged while reading, left so21 ms" in words
+    words = _Page(quality_page({**transfer.report, "repair": {**repair, "spans": {}, "seconds": {}}}, [])).words
+    assert "Nothing was found to repair." in words
+    words = _Page(quality_page(transfer.report, [])).words
+    assert "nothing was repaired" in words
+    assert "Nothing was repaired." in words
 
 
 def _chromium(page: Path, folder: Path, *arguments: str) -> bytes:

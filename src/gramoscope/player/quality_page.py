@@ -12,13 +12,13 @@ from gramoscope.listening.page import bullets, facts, figure, figures, page, par
 from gramoscope.listening.quality_figures import band_figure, density_figure, response_figure, share_figure
 from gramoscope.listening.report import plain
 from gramoscope.player.page_provenance import provenance_section
-from gramoscope.player.page_words import decibels, duration, flat_rows, hertz, number, percent
+from gramoscope.player.page_speed import speed_section
+from gramoscope.player.page_words import decibels, duration, hertz, number, percent
 from gramoscope.player.picture import Place
+from gramoscope.player.speed import speed_in_words
 
 Report = Mapping[str, Any]
 SHOWN_PROBLEMS = 20
-SPEED_KEYS = ("speed", "wow", "hints")
-"""Keys of the report under which there may be tables of what was found of the speed."""
 
 
 def quality_page(report: Report, places: Sequence[Place]) -> str:
@@ -37,7 +37,7 @@ def quality_page(report: Report, places: Sequence[Place]) -> str:
         _seen(told),
         _spectra(told),
         _walls(told),
-        _speed(told),
+        speed_section(told),
         _calibration(told),
         _worst(told, places),
         _applied(told),
@@ -55,10 +55,10 @@ def _title(report: Report) -> str:
 def _summary(report: Report) -> Iterator[tuple[str, str]]:
     noise, share, groups = report["noise_estimate"], report["share"], report["groups"]
     usable = report["quality"]["spectrum"]["usable_to_hz"]
-    rotation, walls = report["bench"]["rotation"], " and ".join(report["walls_read"])
+    cut, walls = report["bench"]["disc"]["cut"], " and ".join(report["walls_read"])
     yield (
         "Heard",
-        f"{duration(report['seconds'])} of a {report['bench']['disc']['cut']} cut at {rotation['rpm']:g} rpm; {walls} wall; "
+        f"{duration(report['seconds'])} of a {cut} cut at {speed_in_words(report['speed'])}; {walls} wall; "
         f"recipe “{report['recipe']['name']}”; {report['rate_hz'] / 1e3:g} kHz",
     )
     yield (
@@ -80,7 +80,7 @@ def _summary(report: Report) -> Iterator[tuple[str, str]]:
 
 
 def _repairs(report: Report) -> str:
-    repair = report.get("repair")
+    repair = report["repair"]
     return f"repaired: {'; '.join(repair['history'])}" if repair else "nothing was repaired"
 
 
@@ -215,33 +215,6 @@ def _walls(report: Report) -> str:
     )
 
 
-def _speed(report: Report) -> str:
-    step, places = report["frame_step"], report["group_positions"]
-    found = number(step["measured_mean_um"], "µm", digits=4)
-    spread, away = (_nanometres(um) for um in (step["measured_spread_um"], places["rms_error_of_the_nominal_step_um"]))
-    film = report["bench"].get("sequence")
-    stated = [] if film is None else [f"stated {number(1e6 * film['frame_step_m'], 'µm', digits=4)}"]
-    steps = "; ".join([f"{found} ± {spread} by {step['steps_measured']} pairs", *stated])
-    rows = [
-        *([("step from frame to frame", steps)] if film is not None else []),
-        ("overlaps of groups matched", f"{places['overlaps_matched']}; {places['overlaps_not_matched']} not"),
-        ("error of the stated group step", f"{away} rms"),
-        *_speed_rows(report),
-    ]
-    return section("speed", "Speed and wow", facts(rows))
-
-
-def _nanometres(length_um: float | None) -> str:
-    return number(None if length_um is None else 1e3 * length_um, "nm")
-
-
-def _speed_rows(report: Report) -> Iterator[tuple[str, str]]:
-    """Whatever was found of the speed, by its names."""
-    for key in SPEED_KEYS:
-        for name, text in flat_rows(report.get(key) or {}, key):
-            yield name.replace(".", ", ").replace("_", " "), text
-
-
 def _calibration(report: Report) -> str:
     rows = [
         (
@@ -293,14 +266,34 @@ def _applied(report: Report) -> str:
             [
                 ("curve", response["title"]),
                 *corners,
-                (
-                    "filter and curve differ by",
-                    _deviation(response),
-                ),
+                ("filter and curve differ by", _deviation(response)),
             ]
         ),
         figures([picture]),
+        _touched(report),
     )
+
+
+def _touched(report: Report) -> str:
+    repair = report["repair"]
+    if repair is None:
+        return paragraph("Nothing was repaired.")
+    rows = [
+        (_KINDS[kind], f"{spans}", number(1e3 * repair["seconds"][kind], "ms"))
+        for kind, spans in repair["spans"].items()
+    ]
+    words = "What was repaired before it; cues.json and labels.txt say where, difference.wav what was taken off."
+    return (
+        table(("repair", "spans", "in all"), rows, caption=words) if rows else paragraph("Nothing was found to repair.")
+    )
+
+
+_KINDS = {
+    "declick": "clicks replaced",
+    "decrackle": "crackle taken off",
+    "rumble": "rumble taken off",
+    "interpolated": "bridged while reading, left so",
+}
 
 
 def _deviation(response: Report) -> str:
@@ -319,13 +312,8 @@ def _files(report: Report) -> str:
             f"{number(100 * file['full_scale_m_s'], 'cm/s')}",
         )
         for name, file in report["files"].items()
-        if "loudness" in file
     ]
-    sums = [
-        (name, f"{file['what']}. SHA-256 {file['sha256']}")
-        for name, file in report["files"].items()
-        if "sha256" in file
-    ]
+    sums = [(name, f"{file['what']}. SHA-256 {file['sha256']}") for name, file in report["files"].items()]
     return section(
         "files",
         "The files",
