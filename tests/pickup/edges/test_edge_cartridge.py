@@ -136,6 +136,16 @@ def test_bright_grooves_are_found_when_told_so(photograph: Make, picture_of: Mak
     assert 0.8 < np.sqrt(np.mean(_pulls(grooves, drawn.edges()) ** 2)) < 1.25
 
 
+def test_edges_that_are_lone_bright_lines_are_found_when_told_so(photograph: Make) -> None:
+    # land and walls alike, only the edges shine
+    drawn = photograph(land=40.0, wall=39.99, line=120.0)
+    grooves = EdgeCartridge(appearance=Appearance.BRIGHT_LINES).find(drawn.still())
+    assert len(grooves) == 3
+    assert 0.8 < np.sqrt(np.mean(_pulls(grooves, drawn.edges()) ** 2)) < 1.25
+    for groove, true in zip(grooves, drawn.edges(), strict=True):
+        assert np.abs((groove.row_px - true).mean(axis=1)).max() < 0.02
+
+
 def test_a_picture_is_not_changed(photograph: Make) -> None:
     picture = photograph().still()
     before = picture.image.copy()

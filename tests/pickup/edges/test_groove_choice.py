@@ -44,3 +44,9 @@ def test_a_groove_torn_in_two_is_mended() -> None:
     bottom = [_course(INNER, 230, 2.7), _course(OUTER, 240, 2.7)]
     third = [_course(OUTER, 330, 3.3), _course(INNER, 420, 3.1)]
     assert _rows(choose_grooves([*EDGES, *bottom, *third, *CHANCE[:2]])) == [(50, 140), (190, 280), (330, 420)]
+
+
+def test_of_lone_lines_the_wider_spaces_are_grooves() -> None:
+    lines = [_course(OUTER, row, 3.0) for row in (140, 50, 280, 190)]
+    assert _rows(choose_grooves([*lines, *CHANCE], lines=True)) == [(50, 140), (190, 280)]
+    assert _rows(choose_grooves([*lines[:1], *lines[2:], *CHANCE], lines=True)) == [(None, 140), (190, 280)]

@@ -17,4 +17,4 @@ class Appearance(Enum):
     BRIGHT_GROOVES = auto()
     """Walls are brighter than the land beside them."""
     BRIGHT_LINES = auto()
-    """Edges are thin bright lines, with nothing to tell land from wall."""
+    """Edges are thin bright lines, with nothing to tell land from wall: what is wider is taken for the groove."""

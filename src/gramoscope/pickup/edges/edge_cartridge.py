@@ -113,7 +113,7 @@ class EdgeCartridge:
             margin_px=round(MARGIN_SHARE * pitch_px),
             most=int(EDGES_A_PITCH * rows / pitch_px) + SPARE_COURSES,
         )
-        return choose_grooves(courses)
+        return choose_grooves(courses, lines=self.appearance is Appearance.BRIGHT_LINES)
 
     def _sharpened(
         self, picture: StillPicture, groove: CoarseGroove, half_px: int, burnt: int

@@ -168,7 +168,8 @@ def _amplitude(value: FloatArray, shape: FloatArray, weight: FloatArray) -> Floa
 def _middle(profile: CubicSpline, half_px: float, *, line: bool) -> float:
     """Where the edge lies in the middle half of its profile: the centre of the peak of its slope, or of the line."""
     fine = np.linspace(-0.5 * half_px, 0.5 * half_px, 401)
-    height = (profile(fine) - np.median(profile(fine)) if line else profile(fine, 1)) ** 2
+    beside = np.median(profile(np.linspace(-half_px, half_px, 401)))
+    height = (profile(fine) - beside if line else profile(fine, 1)) ** 2
     peak = height > 0.1 * height.max()
     # the peak that holds the maximum, and no other
     runs = np.cumsum(np.diff(peak, prepend=peak[0]))

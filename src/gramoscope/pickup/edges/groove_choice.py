@@ -8,7 +8,7 @@ of all choices of courses that do so the one is taken that collects most above t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -81,10 +81,30 @@ def pair(edges: Sequence[Course]) -> list[CoarseGroove]:
     return grooves
 
 
-def choose_grooves(courses: Sequence[Course]) -> list[CoarseGroove]:
-    """Return the grooves among coarse courses, by growing row; none where no course stands out."""
+def choose_grooves(courses: Sequence[Course], *, lines: bool = False) -> list[CoarseGroove]:
+    """Return the grooves among coarse courses, by growing row; none where no course stands out.
+
+    Parameters
+    ----------
+    courses : sequence of Course
+    lines : bool
+        Whether edges are lone lines, so that nothing but their distances tells land from groove.
+    """
     least = least_evidence(courses)
-    return mended(pair(taking_turns(courses, least))) if np.isfinite(least) else []
+    if not np.isfinite(least):
+        return []
+    if lines:
+        return pair(by_distance([course for course in courses if course.evidence > least]))
+    return mended(pair(taking_turns(courses, least)))
+
+
+def by_distance(edges: Sequence[Course]) -> list[Course]:
+    """Return edges by growing row, with the walls that they are if grooves are wider than lands."""
+    ordered = sorted(edges, key=lambda course: float(np.median(course.row)))
+    apart = np.diff([float(np.median(course.row)) for course in ordered])
+    first, second = (float(np.mean(apart[start::2])) if apart[start:].size else 0.0 for start in (0, 1))
+    walls = (OUTER, INNER) if first >= second else (INNER, OUTER)
+    return [replace(course, wall=walls[number % 2]) for number, course in enumerate(ordered)]
 
 
 def mended(grooves: Sequence[CoarseGroove]) -> list[CoarseGroove]:
