@@ -48,6 +48,16 @@ class Capture:
     log: FrameLog | None = None
 
     @property
+    def name(self) -> str:
+        """Of the folder."""
+        return self.folder.resolve().name
+
+    @property
+    def path(self) -> Path:
+        """What was opened: the folder."""
+        return self.folder
+
+    @property
     def bench(self) -> Bench:
         """The apparatus, canonical."""
         return self.manifest.bench

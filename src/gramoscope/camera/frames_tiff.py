@@ -146,6 +146,21 @@ def _channel_pages(tiff: tifffile.TiffFile, *, frames: int) -> int:
     return 3 if apart and len(series.pages) == 3 * frames else 1
 
 
+def read_first_page(path: Path) -> Frame | Lost:
+    """Return the first picture of a TIFF, whatever its size, or why there is none."""
+    try:
+        with quiet_log():
+            tiff = tifffile.TiffFile(path)
+        with tiff:
+            key: Any = tiff.pages[0].keyframe
+            size = Sensor(width_px=key.imagewidth, height_px=key.imagelength)
+            return _colours(tiff, 0, channels=_channel_pages(tiff, frames=1), path=path, sensor=size)
+    except FileNotFoundError:
+        return Lost(f"{path.name} is missing")
+    except Exception as error:  # decoders raise whatever they like at a broken file
+        return Lost(f"{path.name} cannot be read ({words_of(error)})")
+
+
 def write_tiff(path: Path, frames: Frame, *, compress: bool = False) -> None:
     """Write frames as the pages of one TIFF.
 

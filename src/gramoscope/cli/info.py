@@ -21,7 +21,7 @@ def info(capture: Path, /, *, quick: bool = False, quiet: bool = False, json: bo
     Parameters
     ----------
     capture
-        Folder with `capture.toml` and frames.
+        Folder with `capture.toml` and frames or pictures, or one picture.
     quick
         Read a few groups only, and see whether the other files are there.
     quiet
@@ -29,13 +29,17 @@ def info(capture: Path, /, *, quick: bool = False, quiet: bool = False, json: bo
     json
         Print everything as JSON.
     """
-    from gramoscope.apparatus.capture import open_capture
     from gramoscope.apparatus.inspection import inspect
+    from gramoscope.apparatus.opening import opened
+    from gramoscope.apparatus.still import StillCapture
+    from gramoscope.cli.info_still import info_still
 
     terminal = Terminal(quiet, json)
-    opened = open_capture(capture)
+    found_there = opened(capture)
+    if isinstance(found_there, StillCapture):
+        return info_still(found_there, terminal, quick=quick)
     with terminal.progress("Looking") as progress:
-        found = inspect(opened, quick=quick, progress=progress)
+        found = inspect(found_there, quick=quick, progress=progress)
     terminal.result({**found.as_dict(), "sound": found.sound})
     _tell(terminal, found)
     return FINE if found.sound else FOUND_WRONG
