@@ -140,7 +140,7 @@ class Sharpening:
         for number in range(self.rounds):
             band = edge_band(picture, settled.row, wall=wall, half_px=half_px, burnt=burnt)
             # where nothing is measured yet the coarse course leads, so that it can be found again
-            leading = guide if number < self.rounds - 2 else None
+            leading = guide if number < self.rounds - 1 else None
             seen = self._look(band, settled, kept, inside, leading, line=line, gated=number >= self.rounds // 2)
             if seen is None:
                 return None
