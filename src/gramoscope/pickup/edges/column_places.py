@@ -55,7 +55,9 @@ class ColumnPlaces:
     kept: BoolArray
 
 
-def column_places(band: EdgeBand, profile: EdgeProfile, kept: BoolArray, *, dust_gate: float) -> ColumnPlaces:
+def column_places(
+    band: EdgeBand, profile: EdgeProfile, kept: BoolArray, *, dust_gate: float, settled: bool
+) -> ColumnPlaces:
     """Return what every column says of the place of its edge.
 
     Parameters
@@ -66,6 +68,9 @@ def column_places(band: EdgeBand, profile: EdgeProfile, kept: BoolArray, *, dust
         Pixels that have been no dust so far.
     dust_gate : float
         A pixel so many standard deviations off the profile is dust.
+    settled : bool
+        Whether the course follows the edge already: then the noise is judged on the course. Judged after each column's
+        step it is too small, for the step takes along what neighbouring pixels share.
     """
     rest = band.level - profile.expected
     noise = _first_noise(band, rest, kept)
@@ -74,7 +79,7 @@ def column_places(band: EdgeBand, profile: EdgeProfile, kept: BoolArray, *, dust
         after = rest - profile.gradient * step[:, None]
         dust = band.usable & (np.abs(after) > dust_gate * noise)
         kept = band.usable & ~binary_dilation(dust, np.ones((3, 3), np.bool_))
-        noise = _noise(band, after, profile.gradient, noise, kept)
+        noise = _noise(band, rest if settled else after, 0.0 if settled else profile.gradient, noise, kept)
         step, gain, whole = _steps(rest, profile.gradient, noise, kept)
     after = np.where(kept, (rest - profile.gradient * step[:, None]) / noise, 0.0)
     # the step has taken noise along where the profile is steep; likeness is judged where it is not
@@ -105,7 +110,9 @@ def _first_noise(band: EdgeBand, rest: FloatArray, kept: BoolArray) -> FloatArra
     return _at_places(band, np.where(weight > 0, 1.2533 * mean, usual), half_px)
 
 
-def _noise(band: EdgeBand, after: FloatArray, gradient: FloatArray, noise: FloatArray, kept: BoolArray) -> FloatArray:
+def _noise(
+    band: EdgeBand, after: FloatArray, gradient: FloatArray | float, noise: FloatArray, kept: BoolArray
+) -> FloatArray:
     """The noise of each pixel: across the edge by its place, along it by how dirty or bright the neighbourhood is."""
     half_px = (after.shape[1] - 1) / 2 + 0.5
     information = (gradient / noise) ** 2 * kept

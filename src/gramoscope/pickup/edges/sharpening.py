@@ -140,7 +140,7 @@ class Sharpening:
         for number in range(self.rounds):
             band = edge_band(picture, settled.row, wall=wall, half_px=half_px, burnt=burnt)
             # where nothing is measured yet the coarse course leads, so that it can be found again
-            leading = guide if number < self.rounds - 2 else None
+            leading = guide if number < self.rounds - 1 else None
             seen = self._look(band, settled, kept, inside, leading, line=line, gated=number >= self.rounds // 2)
             if seen is None:
                 return None
@@ -160,7 +160,7 @@ class Sharpening:
     ) -> _Round | None:
         """One round: profile, places, course; None when hardly anything is measured."""
         profile = learn_profile(band, band.usable if kept is None else kept & band.usable, line=line)
-        places = column_places(band, profile, band.usable, dust_gate=self.dust_gate)
+        places = column_places(band, profile, band.usable, dust_gate=self.dust_gate, settled=guide is None)
         step = np.clip(places.step, -GREATEST_STEP_PX, GREATEST_STEP_PX)
         # a column that leaves its edge anywhere in the band says nothing
         seen = inside & (places.lost < self.most_lost) & (places.variance < (0.25 * band.level.shape[1]) ** 2)
@@ -174,7 +174,8 @@ class Sharpening:
         row = course.row + band.towards_land * (step + profile.middle_px)
         weight = seen / (variance * (1 + 2 * places.likeness[1:].sum()))
         if guide is None:
-            settled = steady_course(row, weight)
+            # as stiff as before: noise that is judged more strictly now is no reason to follow less
+            settled = steady_course(row, weight, stiffness=course.stiffness)
         else:
             leading = inside & ~seen & ~band.burnt.any(axis=1)
             settled = steady_course(np.where(leading, guide, row), np.where(leading, GUIDE_SIGMA_PX**-2, weight))
