@@ -111,7 +111,10 @@ class Teacher:
         lateral, vertical = (
             learn(
                 lessons(
-                    (Lesson(self._seen(trusted(s), name), float(level[i]), s.correlation_samples) for s, level in teachers),
+                    (
+                        Lesson(self._seen(trusted(s), name), float(level[i]), s.correlation_samples)
+                        for s, level in teachers
+                    ),
                     self.step_m,
                 ),
                 self.step_m,
