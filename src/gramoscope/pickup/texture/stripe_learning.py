@@ -198,8 +198,8 @@ class StripeLearning:
     least_columns : int
         A stripe seen in fewer columns is not read.
     channels, patterns, filters : int
-        Channels of a window that are drawn, those among them that show whether there is the usual texture, and filters, an
-        even number.
+        Channels of a window that are drawn, at most 16, those among them that show whether there is the usual texture, and
+        filters, an even number.
     """
 
     largest_lag_px: int = 150
