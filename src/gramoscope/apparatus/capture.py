@@ -85,12 +85,28 @@ class Capture:
         ArgumentError
             If there is no such group.
         """
+        return self._group(
+            number, lambda images, valid, remarks: self._read_into(images, valid, remarks, number=number)
+        )
+
+    def unread_group(self, number: int, why: str) -> FrameGroup:
+        """Return a stretch none of whose frames could be read, for a reason that is not in the capture.
+
+        Parameters
+        ----------
+        number : int
+        why : str
+            For the group's problems.
+        """
+        return self._group(number, lambda images, valid, remarks: remarks.add(why))
+
+    def _group(self, number: int, fill: Callable[[ImageArray, npt.NDArray[np.bool_], _Remarks], None]) -> FrameGroup:
         require(0 <= number < self.group_count, f"group {number}", f"0 … {self.group_count - 1}")
         sequence, sensor = self.bench.sequence, self.bench.sensor
         images = np.zeros((sequence.frames_per_group, sensor.height_px, sensor.width_px), sensor.dtype)
         valid = np.zeros(sequence.frames_per_group, np.bool_)
         remarks = _Remarks()
-        self._read_into(images, valid, remarks, number=number)
+        fill(images, valid, remarks)
         arc_start_m, stage_m = self._places(number, remarks)
         return FrameGroup(
             number=number,

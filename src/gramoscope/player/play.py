@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -30,9 +31,10 @@ from gramoscope.player.hints import Hints
 from gramoscope.player.monitor import OVERVIEW_POINTS, Monitor
 from gramoscope.player.outputs import Outputs
 from gramoscope.player.picture import groove_picture, worst_places
-from gramoscope.player.provenance import InputHashes, hash_group
+from gramoscope.player.provenance import InputHashes
 from gramoscope.player.quality_meter import QualityMeter
 from gramoscope.player.quality_page import quality_page
+from gramoscope.player.reading import Reading, Work, reading_of
 from gramoscope.player.recipe import Recipe
 from gramoscope.player.report import transfer_report
 from gramoscope.player.speed import Speed
@@ -50,7 +52,7 @@ from gramoscope.player.tracks import (
     tracks_of,
     vertical,
 )
-from gramoscope.player.workers import in_order, spreading
+from gramoscope.player.workers import spreading
 from gramoscope.preamp.equalisation import Equaliser
 from gramoscope.preamp.resample import Resampler
 from gramoscope.preamp.walls import WallSplitter, in_direction
@@ -128,6 +130,7 @@ def play(
     *,
     progress: Progress | None = None,
     judge: Callable[[Mapping[str, Any]], Mapping[str, Any]] | None = None,
+    work: Work | None = None,
 ) -> dict[str, Any]:
     """Turn a capture into sound files, a report and a picture.
 
@@ -142,6 +145,8 @@ def play(
         Told how much is done, of how much, and of what ("Learning", "Playing").
     judge : callable, optional
         Given the report before anything is put in place; returns what to add to it, or raises (`player.again`).
+    work : Work, optional
+        Who reads, and what becomes of what was read before (`player.reading`); the result does not depend on it.
 
     Returns
     -------
@@ -153,7 +158,8 @@ def play(
     CaptureError
         If the groove was not seen anywhere.
     OutputError
-        If something cannot be written. Whatever is raised, no half-written file stays.
+        If something cannot be written. Whatever is raised, no half-written file stays, but what was read is kept: the same
+        call goes on from there.
     """
     started = time.perf_counter()
     bench, direction = capture.bench, direction_of_cut(capture.bench.disc.cut)
@@ -163,10 +169,13 @@ def play(
     resampler = Resampler(rotation, settings.rate_hz, recipe.passband)
     hashes, monitor = InputHashes(), _monitor(capture, tonearm, resampler)
 
-    with _outputs(capture, recipe, folder, settings) as files:
-        pickup = learned(capture, recipe, settings.workers, device=settings.device, progress=progress)
+    with (
+        _outputs(capture, recipe, folder, settings) as files,
+        _reading(capture, recipe, folder, settings, work or Work(), progress) as reading,
+    ):
+        pickup = reading.pickup
         centring = surveyed(capture, pickup, settings.workers, asked=settings.speed.remove_wow)
-        traces = _picked_up(capture, pickup, settings.workers, hashes, monitor, progress)
+        traces = _picked_up(reading, hashes, monitor, progress)
         motion = monitor.followed(tonearm.follow(_spliced(centring.centred(traces), recipe, monitor)))
         sound = files.kept(WALLS, resampler.resample(motion), WallSplitter(direction, pickup.walls).split)
         sound = files.kept(VERTICAL, sound, vertical)
@@ -176,6 +185,7 @@ def play(
         _require_sound(monitor)
         elapsed_s = time.perf_counter() - started
         report = transfer_report(capture, recipe, pickup, settings, hashes, monitor, centring, files, folder, elapsed_s)
+        report["remarks"] += reading.remarks()
         report |= judge(report) if judge is not None else {}
         picture = groove_picture(capture, pickup, monitor, rate_hz=settings.rate_hz, recipe_name=recipe.name)
         files.finish(report, picture, quality_page(report, worst_places(capture, pickup, monitor)))
@@ -207,21 +217,27 @@ def learned(
         return cartridge.learn(capture.group, capture.group_count, spread, told)
 
 
+def _reading(
+    capture: Capture, recipe: Recipe, folder: Path, settings: Settings, work: Work, progress: Progress | None
+) -> AbstractContextManager[Reading]:
+    workers, device = settings.workers, settings.device
+
+    def learn(noted: Capture) -> Pickup:
+        return learned(noted, recipe, workers, device=device, progress=progress)
+
+    return reading_of(capture, recipe, folder, device=device, workers=workers, work=work, learn=learn)
+
+
 def _picked_up(
-    capture: Capture, pickup: Pickup, workers: int, hashes: InputHashes, monitor: Monitor, progress: Progress | None
+    reading: Reading, hashes: InputHashes, monitor: Monitor, progress: Progress | None
 ) -> Iterator[WallTrace]:
     """Read the stretches, several at a time."""
-
-    def read(number: int) -> tuple[WallTrace, dict[str, str], int]:
-        group = capture.group(number)
-        return pickup.read(group), hash_group(capture, number), int(np.count_nonzero(~group.valid))
-
-    for trace, sums, frames_lost in in_order(read, range(capture.group_count), workers=workers):
-        hashes.add(sums)
-        monitor.picked_up(trace, frames_lost)
+    for group in reading.groups():
+        hashes.add({file.name: file.sha256 for file in group.files})
+        monitor.picked_up(group.trace, group.frames_lost)
         if progress is not None:
-            progress(monitor.groups, capture.group_count, "Playing")
-        yield trace
+            progress(monitor.groups, reading.reader.store.group_count, "Playing")
+        yield group.trace
 
 
 def _spliced(traces: Iterator[WallTrace], recipe: Recipe, monitor: Monitor) -> Iterator[WallTrace]:
