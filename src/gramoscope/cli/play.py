@@ -36,6 +36,12 @@ def play(
     force: bool = False,
     workers: Workers = PROCESSORS,
     device: Literal["cpu", "cuda"] = "cpu",
+    executor: Literal["threads", "processes", "dask"] = "threads",
+    scheduler: str | None = None,
+    restart: bool = False,
+    keep_reading: bool = False,
+    verify: bool = False,
+    json_progress: bool = False,
     quiet: bool = False,
     json: bool = False,
 ) -> int:
@@ -49,6 +55,10 @@ def play(
     Repairs are made only when asked for, and can be undone: `flat.wav` stays as it is, and `repaired.wav`, `difference.wav`
     (what was taken off), `cues.json` and `labels.txt` (where, the latter for Audacity) come beside it. `equalised.wav` is then
     made of the repaired sound.
+
+    What was read lies in DIR/.reading.zarr until the transfer is whole. Whatever stops the command (Ctrl-C, a kill, a full
+    disk), the same command goes on from there, and the result is the same to the bit. What has changed since is noticed and
+    read again.
 
     What the film does not show (a chipped wall, a lost frame) is bridged, flagged and counted in the report.
 
@@ -107,6 +117,21 @@ def play(
     device
         What reads: cpu, or cuda, a graphics card by NVIDIA (needs `pip install "gramoscope[gpu]"`; recipe best only; so far
         checked in CUDA's simulator, not on a card). Both agree to rounding.
+    executor
+        Who reads: threads, processes, or the workers of Dask (needs `pip install "gramoscope[cluster]"`), on this machine
+        unless --scheduler says where. The result does not depend on it.
+    scheduler
+        Address of a Dask scheduler that runs already, such as tcp://10.0.0.1:8786, whatever started it. Its workers must see
+        the capture and DIR under the same paths.
+    restart
+        Throw away what an earlier, stopped command read.
+    keep_reading
+        Keep what was read when the transfer is whole: another transfer into DIR, with another rate, characteristic, smoother or
+        repair, then need not read again.
+    verify
+        Add up the files of what was read before, even if size and time of writing are the same.
+    json_progress
+        Tell how far things are in lines of JSON, on standard error.
     quiet
         Say nothing.
     json
@@ -117,6 +142,7 @@ def play(
 
         return play_again(play, locals())
     from gramoscope.apparatus.capture import open_capture
+    from gramoscope.cli.watch import at_work
     from gramoscope.errors import ArgumentError
     from gramoscope.player.catalogue import Catalogue
     from gramoscope.player.devices import device_named
@@ -145,8 +171,9 @@ def play(
         speed=speed,
         device=where,
     )
-    with terminal.progress("Playing") as progress:
-        report = play_capture(opened, chosen, out, settings, progress=progress)
+    how = {"restart": restart, "keep_reading": keep_reading, "verify": verify}
+    with at_work(terminal, out, executor, scheduler, workers, json_progress=json_progress, **how) as (progress, work):
+        report = play_capture(opened, chosen, out, settings, progress=progress, work=work)
     terminal.result(report)
     tell(terminal, report, out)
     return FINE

@@ -235,6 +235,7 @@ def _picked_up(
     for group in reading.groups():
         hashes.add({file.name: file.sha256 for file in group.files})
         monitor.picked_up(group.trace, group.frames_lost)
+        reading.work.watched(monitor)
         if progress is not None:
             progress(monitor.groups, reading.reader.store.group_count, "Playing")
         yield group.trace

@@ -22,6 +22,7 @@ from gramoscope.player.executors import Answer, Crew, Executor, LostWorkerError,
 from gramoscope.player.files_seen import FileSeen, changed, look_at, seen
 from gramoscope.player.folder_lock import folder_lock
 from gramoscope.player.learned import learned_of, pickup_of
+from gramoscope.player.monitor import Monitor
 from gramoscope.player.pieces import TRIES, Reader, StoppedError, Task
 from gramoscope.player.reading_manifest import differences, key_of, manifest_of
 from gramoscope.player.reading_store import (
@@ -56,6 +57,8 @@ class Work:
         Add up the files of what was read before, even where size and time of writing are as they were.
     told : callable
         Told in words what was found and is done about it.
+    watched : callable
+        Given the monitor after every group.
     """
 
     executor: Executor | None = None
@@ -63,6 +66,7 @@ class Work:
     keep_reading: bool = False
     verify: bool = False
     told: Callable[[str], None] = field(default=lambda words: None)
+    watched: Callable[[Monitor], None] = field(default=lambda monitor: None)
 
 
 @dataclass(eq=False)

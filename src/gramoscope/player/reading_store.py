@@ -40,7 +40,7 @@ PLACES = ("arc_start_m", "arc_step_m", "correlation_samples", "inner_wall_angle_
 ENDS = ("head", "tail")
 LARGEST_PIECE = 64
 """Groups: a minute or so of work, and some ten megabytes."""
-PIECES = 64
+PIECES = 16
 """A shorter passage has at least so many pieces, or one for each group, so that all workers have something to do."""
 _ROOM = {"walls": 4, "flags": 4, "strips": 8}
 """A chunk holds so many samples or columns: the picture's width over this. Longer rows need a second chunk."""
