@@ -52,16 +52,6 @@ def long_film(tone: Path) -> tuple[Any, ...]:
     return (tone, "--start", 0.03, "--seconds", 0.06, "--frames-per-group", 6)
 
 
-@pytest.fixture(scope="session")
-def longer_capture(here: Path, tone: Path, bench: Path) -> Path:
-    """Twenty groups: a second or two of playing."""
-    from gramoscope.cli.main import main
-
-    command = ["film", tone, here / "longer", "--bench", bench, "--seconds", 0.01, "--quiet"]
-    assert main([str(part) for part in command]) == 0
-    return here / "longer"
-
-
 MOMENTS = [("out/.flat.wav.*.part", 0.0), ("out/.flat.wav.*.part", 0.4), ("out/.report.json.*.part", 0.0)]
 
 

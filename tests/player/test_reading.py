@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -153,7 +153,7 @@ class _Stop(BaseException):
 
 
 @pytest.fixture
-def count_reads(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
+def count_reads(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """The numbers of the groups that are read, as they are."""
     numbers: list[int] = []
 
@@ -162,7 +162,7 @@ def count_reads(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
         return read_group(capture, pickup, number)
 
     monkeypatch.setattr(pieces_module, "read_group", counted)
-    yield numbers
+    return numbers
 
 
 @pytest.fixture

@@ -23,6 +23,7 @@ from gramoscope.player.files_seen import FileSeen, changed, look_at, seen
 from gramoscope.player.folder_lock import folder_lock
 from gramoscope.player.learned import learned_of, pickup_of
 from gramoscope.player.monitor import Monitor
+from gramoscope.player.outputs import remove_left_over
 from gramoscope.player.pieces import TRIES, Reader, StoppedError, Task
 from gramoscope.player.reading_manifest import differences, key_of, manifest_of
 from gramoscope.player.reading_store import (
@@ -208,6 +209,7 @@ def reading_of(
     """
     root = folder / STORE
     with folder_lock(folder):
+        remove_left_over(folder)
         useless = False
         try:
             store = _store(root, capture, recipe, device, work)
