@@ -7,6 +7,7 @@
     │   └── NoFramesError                     the manifest is fine, and not one frame can be read
     ├── SoundError                            a sound file cannot be read, or is of no use
     ├── TransferError                         a folder is no whole transfer: no report, a file missing, a sum that differs
+    ├── FilmingError                          a film that is followed does not go on
     ├── WorkerError                           a worker of a cluster cannot read, or would read otherwise
     └── OutputError                           the results cannot be written: a full disk, a folder without permission
 
@@ -74,6 +75,10 @@ class TransferError(GramoscopeError):
 
 class OutputError(GramoscopeError):
     """The results cannot be written."""
+
+
+class FilmingError(GramoscopeError):
+    """A film that is followed does not go on."""
 
 
 class WorkerError(GramoscopeError):

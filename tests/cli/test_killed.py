@@ -72,7 +72,7 @@ class _Killer:
         self._groups, self._workers, self._moments = list(groups), workers, random.Random(3)
         self.killed = 0
 
-    def __call__(self, monitor: Monitor) -> None:
+    def __call__(self, monitor: Monitor, _: Any) -> None:
         if self._groups and monitor.groups >= self._groups[0]:
             self._groups.pop(0)
             living = self._workers()

@@ -251,7 +251,7 @@ def test_a_frame_changed_behind_its_size_and_time_is_found_by_adding_up(
 
 
 def test_a_frame_replaced_while_playing_is_named_in_the_report(copy_of: Path, transfer: Any, tmp_path: Path) -> None:
-    def replaced(monitor: Any) -> None:
+    def replaced(monitor: Any, _: Any) -> None:
         if monitor.groups == 8:
             _rewrite(copy_of / "frames" / "g000001.tif")
 

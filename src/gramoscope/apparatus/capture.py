@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gramoscope.apparatus.bench import Bench
+from gramoscope.apparatus.filming import MARKER
 from gramoscope.apparatus.fingerprint import sha256_of_file, sha256_of_files
 from gramoscope.apparatus.frame_log import FrameLog, nominal_arc_m, read_log
 from gramoscope.apparatus.manifest import MANIFEST_NAME, Manifest, read_manifest
@@ -65,7 +66,8 @@ class Capture:
     @property
     def problems(self) -> tuple[str, ...]:
         """What is wrong with the capture as a whole, in words; a group's own problems are in the group."""
-        return self.log.problems if self.log is not None else ()
+        filming = (f"{MARKER} says that it is still being filmed",) if (self.folder / MARKER).is_file() else ()
+        return (*(self.log.problems if self.log is not None else ()), *filming)
 
     def group(self, number: int) -> FrameGroup:
         """Read one stretch.

@@ -41,6 +41,7 @@ def play(
     restart: bool = False,
     keep_reading: bool = False,
     verify: bool = False,
+    follow: bool = False,
     json_progress: bool = False,
     quiet: bool = False,
     json: bool = False,
@@ -130,6 +131,10 @@ def play(
         repair, then need not read again.
     verify
         Add up the files of what was read before, even if size and time of writing are the same.
+    follow
+        Play along while the capture is still being filmed (see `gramoscope film --live`): groups are played as they arrive,
+        with level, sharpness and stripes on the way, and warnings; the sound can be heard while it grows. The first groups are
+        what is learned from.
     json_progress
         Tell how far things are in lines of JSON, on standard error.
     quiet
@@ -146,6 +151,7 @@ def play(
     from gramoscope.errors import ArgumentError
     from gramoscope.player.catalogue import Catalogue
     from gramoscope.player.devices import device_named
+    from gramoscope.player.following import follow as follow_film
     from gramoscope.player.play import Settings
     from gramoscope.player.play import play as play_capture
     from gramoscope.player.recipe import load_recipe, with_repairs
@@ -156,7 +162,8 @@ def play(
             f"{'CAPTURE' if capture is None else '--out'} requires an argument", "a capture and a folder"
         )
     terminal = Terminal(quiet, json)
-    opened = open_capture(capture)
+    following = follow_film(capture) if follow else None
+    opened = open_capture(capture) if following is None else following.capture
     name = characteristic or opened.bench.disc.characteristic or "riaa"
     catalogue = Catalogue(title=title, originator=originator, reference=reference, description=description)
     chosen = with_repairs(load_recipe(recipe), declick=declick, decrackle=decrackle, rumble_hz=rumble_hz)
@@ -171,7 +178,7 @@ def play(
         speed=speed,
         device=where,
     )
-    how = {"restart": restart, "keep_reading": keep_reading, "verify": verify}
+    how = {"restart": restart, "keep_reading": keep_reading, "verify": verify, "following": following}
     with at_work(terminal, out, executor, scheduler, workers, json_progress=json_progress, **how) as (progress, work):
         report = play_capture(opened, chosen, out, settings, progress=progress, work=work)
     terminal.result(report)

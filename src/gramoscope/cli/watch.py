@@ -12,9 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from gramoscope.cli.terminal import Terminal
+from gramoscope.listening.whole_file import temporary_sibling
 from gramoscope.player.executors import Executor, Processes
+from gramoscope.player.following import Following
+from gramoscope.player.live_meter import LiveMeter
 from gramoscope.player.monitor import Monitor
 from gramoscope.player.reading import STORE, Work
+from gramoscope.signal_path import WallTrace
 
 EVERY_S = 1.0
 """Machines are told so often."""
@@ -30,7 +34,7 @@ def at_work(
     workers: int,
     *,
     json_progress: bool,
-    **how: bool,
+    **how: Any,
 ) -> Iterator[tuple[Shown | None, Work]]:
     """Show a transfer while the block runs; yields what to call with progress, and how to work.
 
@@ -44,11 +48,12 @@ def at_work(
     workers : int
     json_progress : bool
         In lines of JSON.
-    how : bool
+    how
         Further choices, see `Work`.
     """
     quiet = Terminal(quiet=terminal.quiet or json_progress, json=terminal.json)
-    watch = Watch()
+    following: Following | None = how.get("following")
+    watch = Watch(None if following is None else LiveMeter(following.capture.bench))
 
     def told(words: str) -> None:
         if json_progress:
@@ -56,7 +61,13 @@ def at_work(
         else:
             terminal.say(f"[yellow]Note:[/] {words}")
 
-    work = Work(_executor(executor, scheduler, workers, told), told=told, watched=watch.look, **how)
+    def looked(monitor: Monitor, trace: WallTrace) -> None:
+        for warning in watch.look(monitor, trace):
+            told(warning)
+
+    if following is not None:
+        told(f"the sound grows in {temporary_sibling(out / 'flat.wav')}")
+    work = Work(_executor(executor, scheduler, workers, told), told=told, watched=looked, **how)
     try:
         with quiet.progress("Playing") as shown:
             yield watch.shown(_say_now_and_then() if json_progress else shown), work
@@ -67,14 +78,20 @@ def at_work(
 
 
 class Watch:
-    """Looks at the monitor now and then, and adds the signal to noise so far to the progress."""
+    """Looks on, and adds what is known so far to the progress: signal to noise, and with a meter the last group's figures."""
 
-    def __init__(self) -> None:
+    def __init__(self, meter: LiveMeter | None = None) -> None:
         self._monitor: Monitor | None = None
+        self._meter, self._live = meter, ""
 
-    def look(self, monitor: Monitor) -> None:
-        """Take note of a transfer's monitor."""
+    def look(self, monitor: Monitor, trace: WallTrace) -> list[str]:
+        """Take note of a transfer's monitor and a stretch; return new warnings."""
         self._monitor = monitor
+        if self._meter is None:
+            return []
+        figures, warnings = self._meter.look(trace)
+        self._live = figures.words()
+        return warnings
 
     def shown(self, show: Shown | None) -> Shown | None:
         """Return what to call with (done, of how many, of what), which shows that and what is known so far."""
@@ -83,7 +100,8 @@ class Watch:
 
         def said(done: int, total: int, what: str) -> None:
             below_db = math.nan if self._monitor is None else self._monitor.snr_db
-            show(done, total, what if math.isnan(below_db) else f"{what}, {below_db:.1f} dB")
+            known = ["" if math.isnan(below_db) else f"{below_db:.1f} dB", self._live]
+            show(done, total, ", ".join([what, *filter(None, known)]))
 
         return said
 
@@ -96,7 +114,8 @@ def _say_now_and_then() -> Shown:
     def say(done: int, total: int, what: str) -> None:
         nonlocal last
         now = time.monotonic()
-        name, _, below = what.partition(", ")
+        name, *known = what.split(", ")
+        below = next((float(one.removesuffix(" dB")) for one in known if one.endswith(" dB")), None)
         since, first = began.setdefault(name, (now, done))
         if now - last < EVERY_S and done not in (first, total):
             return
@@ -109,7 +128,8 @@ def _say_now_and_then() -> Shown:
                 "total": total,
                 "groups_per_s": _finite(rate),
                 "left_s": _finite((total - done) / rate if rate > 0 else math.nan),
-                "signal_to_noise_db": float(below.removesuffix(" dB")) if below else None,
+                "signal_to_noise_db": below,
+                **({"group": ", ".join(one for one in known if not one.endswith(" dB"))} if len(known) > 1 else {}),
             }
         )
 

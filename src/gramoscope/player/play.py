@@ -193,7 +193,13 @@ def play(
 
 
 def learned(
-    capture: Capture, recipe: Recipe, workers: int, *, device: Device = PROCESSOR, progress: Progress | None = None
+    capture: Capture,
+    recipe: Recipe,
+    workers: int,
+    *,
+    device: Device = PROCESSOR,
+    progress: Progress | None = None,
+    groups: int | None = None,
 ) -> Pickup:
     """Return the recipe's cartridge, fitted to a capture, as it is after learning the passage.
 
@@ -206,6 +212,8 @@ def learned(
         On which it will read.
     progress : callable, optional
         Told how much is done, of how much, and of what.
+    groups : int, optional
+        Learn from the first so many only.
     """
     with spreading(workers) as spread:
         cartridge = recipe.cartridge_for(capture.bench, device)
@@ -214,7 +222,7 @@ def learned(
             if progress is not None:
                 progress(done, total, "Learning")
 
-        return cartridge.learn(capture.group, capture.group_count, spread, told)
+        return cartridge.learn(capture.group, groups or capture.group_count, spread, told)
 
 
 def _reading(
@@ -223,7 +231,11 @@ def _reading(
     workers, device = settings.workers, settings.device
 
     def learn(noted: Capture) -> Pickup:
-        return learned(noted, recipe, workers, device=device, progress=progress)
+        first = None
+        if work.following is not None:
+            first = work.following.learned_groups
+            work.following.wait(first)
+        return learned(noted, recipe, workers, device=device, progress=progress, groups=first)
 
     return reading_of(capture, recipe, folder, device=device, workers=workers, work=work, learn=learn)
 
@@ -235,7 +247,7 @@ def _picked_up(
     for group in reading.groups():
         hashes.add({file.name: file.sha256 for file in group.files})
         monitor.picked_up(group.trace, group.frames_lost)
-        reading.work.watched(monitor)
+        reading.work.watched(monitor, group.trace)
         if progress is not None:
             progress(monitor.groups, reading.reader.store.group_count, "Playing")
         yield group.trace

@@ -14,13 +14,14 @@ from pathlib import Path
 from typing import Any
 
 from gramoscope.apparatus.capture import Capture
-from gramoscope.errors import CaptureError, GramoscopeError
+from gramoscope.errors import CaptureError, GramoscopeError, require
 from gramoscope.interruption import ctrl_c_waits
 from gramoscope.pickup.cartridge import Pickup
 from gramoscope.pickup.device import Device
 from gramoscope.player.executors import Answer, Crew, Executor, LostWorkerError, Threads
 from gramoscope.player.files_seen import FileSeen, changed, look_at, seen
 from gramoscope.player.folder_lock import folder_lock
+from gramoscope.player.following import Following
 from gramoscope.player.learned import learned_of, pickup_of
 from gramoscope.player.monitor import Monitor
 from gramoscope.player.outputs import remove_left_over
@@ -36,7 +37,7 @@ from gramoscope.player.reading_store import (
     open_store,
 )
 from gramoscope.player.recipe import Recipe, table_of_recipe
-from gramoscope.signal_path import FrameGroup
+from gramoscope.signal_path import FrameGroup, WallTrace
 
 STORE = ".reading.zarr"
 MOST_NAMED = 5
@@ -59,7 +60,9 @@ class Work:
     told : callable
         Told in words what was found and is done about it.
     watched : callable
-        Given the monitor after every group.
+        Given the monitor and the stretch after every group.
+    following : Following, optional
+        The capture is still being filmed: wait for its groups.
     """
 
     executor: Executor | None = None
@@ -67,7 +70,16 @@ class Work:
     keep_reading: bool = False
     verify: bool = False
     told: Callable[[str], None] = field(default=lambda words: None)
-    watched: Callable[[Monitor], None] = field(default=lambda monitor: None)
+    watched: Callable[[Monitor, WallTrace], None] = field(default=lambda monitor, trace: None)
+    following: Following | None = None
+
+    def __post_init__(self) -> None:
+        require(
+            self.following is None or self.executor is None,
+            "following a film with other workers than threads",
+            "threads, which see the log grow",
+            "leave --executor and --scheduler out",
+        )
 
 
 @dataclass(eq=False)
@@ -108,11 +120,22 @@ class Reading:
         with self.executor.crew(self.reader) as crew:
             pending: deque[tuple[int, Answer | None]] = deque()
             for number in store.pieces:
+                while pending and not self._is_filmed(number):
+                    yield self._settled(crew, *pending.popleft())
+                self._wait_for(number)
                 pending.append((number, None if store.is_written(number) else crew.submit(self._task(number))))
                 if len(pending) > crew.window:
                     yield self._settled(crew, *pending.popleft())
             while pending:
                 yield self._settled(crew, *pending.popleft())
+
+    def _is_filmed(self, number: int) -> bool:
+        following = self.work.following
+        return following is None or following.has(self.reader.store.groups_of(number).stop)
+
+    def _wait_for(self, number: int) -> None:
+        if self.work.following is not None:
+            self.work.following.wait(self.reader.store.groups_of(number).stop)
 
     def _settled(self, crew: Crew, number: int, answer: Answer | None) -> Piece:
         """Wait for a piece; begin it again when it failed or was lost, or is no longer true."""
@@ -161,6 +184,11 @@ class Reading:
             said.append(f"changed after they were read: {_named(other)}; what is heard is what they were")
         if self.failed:
             said.append(f"not read, though the film may be fine: {_named(self.failed, '; ')}")
+        if self.work.following is not None:
+            said.append(
+                f"played while it was filmed, and learned from its first {self.work.following.learned_groups} groups: play it "
+                "again without --follow for a reading that the whole passage taught"
+            )
         if len(self.processors) > 1:
             kinds = ", ".join(sorted(self.processors))
             said.append(f"read by processors of several kinds ({kinds}): others may get other bits, to rounding")
@@ -228,6 +256,10 @@ def reading_of(
 def _store(root: Path, capture: Capture, recipe: Recipe, device: Device, work: Work) -> ReadingStore:
     """Return the store that was there, if it is of the same reading, or an empty one."""
     manifest = manifest_of(capture, recipe, device)
+    if work.following is not None:
+        # the log still grows, and every group's places are in it before the group is read
+        manifest = {name: one for name, one in manifest.items() if not name.startswith("the file ")}
+        manifest["learned from"] = f"the first {work.following.learned_groups} groups"
     found = None if work.restart else open_store(root)
     if found is not None:
         other = list(differences(found.manifest, manifest))
