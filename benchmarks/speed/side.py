@@ -3,8 +3,8 @@
     python -m benchmarks.speed.side [--groups 512,1024,2048] [--table benchmarks/speed/side.md]
 
 Films 64 groups (12 frames of 1280 × 512) and strings them together over and over by links; every line is a process of its own,
-recipe `best`. Times on the clock are of playing, without learning and without the start of workers. Processor time, of client and
-workers together, does not depend on what else the machine does: what a group costs is the difference of two lengths.
+recipe `best`. Times on the clock are of playing, without learning and without the start of workers. Processor time, of client
+and workers together, does not depend on what else the machine does: what a group costs is the difference of two lengths.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@
     GrooveMotion                   the groove's velocity along the whole passage, piece by piece
       │ preamp                     place → time
     GrooveSound                    both directions in time, piece by piece
-      │ preamp                     the sound of the cut, of the walls; recording characteristic
+      │ preamp                     the sound of the cut, of the walls; repair; recording characteristic
     Audio                          sound, piece by piece
       │ listening                  files, comparison, figures, report
 

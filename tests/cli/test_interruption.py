@@ -17,7 +17,7 @@ import soundfile
 
 from gramoscope.player.reading import STORE
 
-COMMAND = [sys.executable, "-c", "import sys; from gramoscope.cli.main import main; sys.exit(main())"]
+COMMAND = [sys.executable, "-m", "gramoscope"]
 PATIENCE_S = 60.0
 
 

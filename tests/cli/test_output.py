@@ -14,7 +14,7 @@ import pytest
 import soundfile
 import wavinfo
 
-COMMAND = [sys.executable, "-c", "import sys; from gramoscope.cli.main import main; sys.exit(main())"]
+COMMAND = [sys.executable, "-m", "gramoscope"]
 COMMANDS = ("demo", "film", "play", "compare", "info", "recipe", "characteristics", "pack")
 
 

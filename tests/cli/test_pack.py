@@ -16,7 +16,7 @@ import pytest
 
 from gramoscope.cli.main import main
 
-COMMAND = [sys.executable, "-c", "import sys; from gramoscope.cli.main import main; sys.exit(main())"]
+COMMAND = [sys.executable, "-m", "gramoscope"]
 PATIENCE_S = 60.0
 
 

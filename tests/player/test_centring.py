@@ -128,3 +128,20 @@ def test_a_film_of_a_few_stretches_says_why_it_knows_nothing(
     assert wow["removal"] == {"asked": False, "applied": False, "survey": None}
     for hint in transfer.report["hints"].values():
         assert "too short" in hint["reason"]
+
+
+def test_a_removal_puts_the_stretches_of_a_transfer_where_the_groove_has_them(
+    capture: Path, transfer: Any, played: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[int] = []
+
+    class _Noting(Centring):
+        def centred(self, traces: Any) -> Any:
+            for trace in super().centred(traces):
+                asked.append(trace.number)
+                yield trace
+
+    monkeypatch.setattr("gramoscope.player.play.surveyed", lambda *_, asked: _Noting(asked))
+    same = played(capture, tmp_path / "out")
+    assert asked == list(range(8)), "every stretch passes by, once and in order"
+    assert same.bits("flat.wav") == transfer.bits("flat.wav")

@@ -23,7 +23,7 @@ from gramoscope.errors import OutputError
 from gramoscope.listening.broadcast_metadata import BroadcastMetadata
 from gramoscope.player.outputs import Outputs
 from gramoscope.player.track_file import TrackFile
-from gramoscope.player.tracks import EQUALISED, FLAT, TRACKS, Track, alone
+from gramoscope.player.tracks import EQUALISED, FLAT, REPAIR_TRACKS, TRACKS, Track, alone
 from gramoscope.quality import Quality
 from gramoscope.signal_path import Audio
 
@@ -325,5 +325,6 @@ def test_what_became_of_each_file_is_told(tmp_path: Path) -> None:
 
 
 def test_tracks_have_names_of_their_own_and_say_what_they_are() -> None:
-    assert len({track.name for track in TRACKS}) == len(TRACKS) == 4
-    assert all(track.name.endswith(".wav") and track.what.isascii() for track in TRACKS)
+    every = (*TRACKS, *REPAIR_TRACKS)
+    assert len({track.name for track in every}) == len(every) == 6
+    assert all(track.name.endswith(".wav") and track.what.isascii() for track in every)

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from gramoscope.errors import ArgumentError
+from gramoscope.player.hints import Hints
 from gramoscope.player.speed import Speed, load_speed_curve
+from gramoscope.signal_path import Audio
 from gramoscope.turntable.rotation import Rotation
 from gramoscope.turntable.speed_curve import SpeedCurve
 
@@ -85,3 +87,43 @@ def test_a_faster_record_is_shorter_louder_and_says_so(
     assert "gramophone record; 97.5 rpm; lateral cut" in history[0]
     assert "speed 97.5 rpm in place of 78 as captured;" in history[1]
     assert transfer.report["speed"]["chosen"] is None
+
+
+def test_a_speed_that_drifts_bends_time_as_its_curve_says(
+    capture: Path, transfer: Any, played: Callable[..., Any], tmp_path: Path
+) -> None:
+    """The groove is the same: at each moment it is where the curve says, as fast as the record turns there."""
+    rpm_at_the_end = 90.0
+    curve = SpeedCurve((0.0, transfer.report["seconds"]), (78.0, rpm_at_the_end))
+    drifting = played(capture, tmp_path / "out", workers=1, speed=Speed(name="drift.csv", curve=curve))
+    steady_time_s = curve.angle_of_time_rad(np.arange(drifting["flat.wav"].size) / 96_000) / (78.0 * 2 * np.pi / 60)
+    flat = transfer["flat.wav"]
+    expected = np.interp(steady_time_s, np.arange(flat.size) / 96_000, flat)
+    expected *= curve.rpm_at(np.arange(expected.size) / 96_000) / 78.0
+    inside = slice(40, -40)
+    error = drifting["flat.wav"][inside] - expected[inside]
+    assert np.std(error) < 0.1 * np.std(expected[inside])
+    assert np.std(drifting["flat.wav"][inside] - flat[: expected.size][inside]) > 0.5 * np.std(expected[inside])
+    assert drifting.report["seconds"] == pytest.approx(
+        float(curve.time_of_angle_s(transfer.report["seconds"] * 78.0 * 2 * np.pi / 60)), abs=2e-5
+    )
+    assert drifting.report["hints"]["mains_hum"]["reason"] is not None
+
+
+def test_hints_at_a_drifting_speed_are_factors_and_no_speeds() -> None:
+    time_s = np.arange(20 * 4000) / 4000
+    hum = 1e-3 * np.sin(2 * np.pi * 49.0 * time_s) + 3e-5 * np.random.default_rng(3).standard_normal(time_s.size)
+    nothing = np.zeros(time_s.size)
+    said = []
+    for rpm in (78.0, None):
+        hints = Hints(rpm, 4000.0)
+        hints.hear(Audio(0, 4000.0, hum, nothing, nothing.astype(np.uint16)))
+        said.append(hints.as_dict()["mains_hum"])
+    steady, drifting = said
+    assert steady["speeds"][0]["factor"] == pytest.approx(50 / 49, rel=1e-3)
+    assert steady["speeds"][0]["rpm"] == pytest.approx(78 * 50 / 49, rel=1e-3)
+    assert "rpm" in steady["words"]
+    assert "rpm" not in drifting["speeds"][0]
+    assert "1.02" in drifting["words"]
+    assert "times as fast" in drifting["words"]
+    assert "rpm" not in drifting["words"]
