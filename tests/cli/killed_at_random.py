@@ -19,7 +19,7 @@ from pathlib import Path
 from gramoscope.apparatus.capture import open_capture
 from gramoscope.player.catalogue import Catalogue
 from gramoscope.player.play import Settings, play
-from gramoscope.player.reading import STORE
+from gramoscope.player.reading_store import STORE
 from gramoscope.player.recipe import load_recipe
 
 RECIPE = load_recipe("seed-paper")

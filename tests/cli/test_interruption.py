@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 import soundfile
 
-from gramoscope.player.reading import STORE
+from gramoscope.player.reading_store import STORE
 
 COMMAND = [sys.executable, "-m", "gramoscope"]
 PATIENCE_S = 60.0

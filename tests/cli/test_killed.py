@@ -24,7 +24,8 @@ from gramoscope.player.catalogue import Catalogue
 from gramoscope.player.executors import Executor, Processes
 from gramoscope.player.monitor import Monitor
 from gramoscope.player.play import Settings, play
-from gramoscope.player.reading import STORE, Work
+from gramoscope.player.reading import Work
+from gramoscope.player.reading_store import STORE
 from gramoscope.player.recipe import load_recipe
 
 SOUNDS = ("flat.wav", "walls.wav", "vertical.wav", "equalised.wav")

@@ -19,9 +19,17 @@ from gramoscope.player.folder_lock import folder_lock
 from gramoscope.player.kept_records import DamagedRecordError, bytes_of, record_of
 from gramoscope.player.pieces import read_group
 from gramoscope.player.play import Settings, play
-from gramoscope.player.reading import STORE, Work
+from gramoscope.player.reading import Work
 from gramoscope.player.reading_manifest import manifest_of
-from gramoscope.player.reading_store import GroupReading, Piece, ReadingStore, create_store, groups_a_piece, open_store
+from gramoscope.player.reading_store import (
+    STORE,
+    GroupReading,
+    Piece,
+    ReadingStore,
+    create_store,
+    groups_a_piece,
+    open_store,
+)
 from gramoscope.player.recipe import load_recipe
 from gramoscope.signal_path import Texture, WallTrace
 

@@ -17,7 +17,8 @@ from gramoscope.player.executors import Executor, Processes
 from gramoscope.player.following import Following
 from gramoscope.player.live_meter import LiveMeter
 from gramoscope.player.monitor import Monitor
-from gramoscope.player.reading import STORE, Work
+from gramoscope.player.reading import Work
+from gramoscope.player.reading_store import STORE
 from gramoscope.signal_path import WallTrace
 
 EVERY_S = 1.0

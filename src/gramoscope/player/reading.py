@@ -28,6 +28,7 @@ from gramoscope.player.outputs import remove_left_over
 from gramoscope.player.pieces import TRIES, Reader, StoppedError, Task
 from gramoscope.player.reading_manifest import differences, key_of, manifest_of
 from gramoscope.player.reading_store import (
+    STORE,
     GroupReading,
     Piece,
     ReadingStore,
@@ -39,7 +40,6 @@ from gramoscope.player.reading_store import (
 from gramoscope.player.recipe import Recipe, table_of_recipe
 from gramoscope.signal_path import FrameGroup, WallTrace
 
-STORE = ".reading.zarr"
 MOST_NAMED = 5
 
 

@@ -35,6 +35,8 @@ from gramoscope.player.learned import Learned
 from gramoscope.player.reading_manifest import key_of
 from gramoscope.signal_path import Texture, WallTrace
 
+STORE = ".reading.zarr"
+"""Where it lies in the folder of a transfer."""
 QUANTITIES = ("offset_m", "offset_sigma_m", "slope", "slope_sigma")
 PLACES = ("arc_start_m", "arc_step_m", "correlation_samples", "inner_wall_angle_rad", "outer_wall_angle_rad")
 ENDS = ("head", "tail")
