@@ -6,6 +6,7 @@ see capture and store under the same paths.
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -102,7 +103,8 @@ class _ClusterCrew:
     @property
     def window(self) -> int:
         """Twice as many as there are threads at the moment: workers come and go."""
-        return AHEAD * max(int(sum(self._client.nthreads().values())), 1)
+        with self._asking():
+            return AHEAD * max(int(sum(self._client.nthreads().values())), 1)
 
     @property
     def dashboard(self) -> str:
@@ -111,18 +113,36 @@ class _ClusterCrew:
 
     def submit(self, task: Task) -> Answer:
         """Send a task; Dask sends it again when its worker is lost."""
-        future = self._client.submit(read_elsewhere, task, pure=False)
+        with self._asking():
+            future = self._client.submit(read_elsewhere, task, pure=False)
         self._under_way.add(future)
-        return _ClusterAnswer(future, self._dask, self._under_way)
+        return _ClusterAnswer(future, self._client, self._dask, self._under_way)
 
     def drop(self) -> None:
         """Call off what nobody waits for any more."""
-        self._client.cancel(list(self._under_way))
+        with contextlib.suppress(OSError, self._dask.CancelledError, RuntimeError):
+            self._client.cancel(list(self._under_way))
+
+    @contextmanager
+    def _asking(self) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, RuntimeError, self._dask.CancelledError) as error:
+            raise _lost_scheduler(error) from error
+
+
+def _lost_scheduler(error: BaseException) -> WorkerError:
+    return WorkerError(
+        f"the Dask scheduler was lost: {error!r}",
+        "a scheduler that runs as long as the transfer",
+        "start it again, and give the same command: what was read is kept",
+    )
 
 
 @dataclass(frozen=True)
 class _ClusterAnswer:
     future: Any
+    client: Any
     dask: Any
     under_way: set[Any]
 
@@ -132,6 +152,10 @@ class _ClusterAnswer:
             self.future.result()
         except self.dask.scheduler.KilledWorker as error:
             raise LostWorkerError(str(error)) from error
+        except Exception as error:
+            if self.client.status != "running" or isinstance(error, self.dask.CancelledError):
+                raise _lost_scheduler(error) from error
+            raise
         finally:
             self.under_way.discard(self.future)
             self.future.release()
