@@ -55,7 +55,7 @@ def _trace(rng: np.random.Generator, number: int, samples: int, strip: tuple[int
     flags = rng.integers(0, 2**15, (2, samples)).astype(np.uint16)
     steps = np.array([8e-7, np.nan, 8.1e-7])[:number]
     return WallTrace(
-        number, 1e-3 / 3, 3e-6, *walls, 5.0, flags, texture, None, steps, np.array([0.7, np.nan]), ("frame 3: ä", "b")
+        number, 1e-3 * rng.random(), 3e-6, *walls, 5.0, flags, texture, None, steps, np.array([0.7, np.nan]), ("frame 3: ä", "b")
     )
 
 
@@ -90,6 +90,28 @@ def test_a_chunk_that_was_cut_off_or_changed_makes_the_piece_unwritten(store: Re
     (chunk, *_) = [path for path in (store.root / name / "c").rglob("*") if path.is_file()]
     chunk.write_bytes(chunk.read_bytes()[:-1000])
     assert store.read(0) is None
+
+
+@pytest.mark.parametrize("name", ["walls", "flags", "places", "strips"])
+def test_a_whole_chunk_in_the_wrong_place_makes_the_piece_unwritten(store: ReadingStore, name: str) -> None:
+    """As when somebody is killed while a piece is written anew."""
+    rng = np.random.default_rng(6)
+    for number in (0, 1):
+        store.write(number, Piece(tuple(GroupReading(_trace(rng, n, 50, (448, 100))) for n in range(8))))
+    for path in [path for path in (store.root / name / "c" / "1").rglob("*") if path.is_file()]:
+        path.replace(store.root / name / "c" / "0" / path.relative_to(store.root / name / "c" / "1"))
+    assert store.read(0) is None
+
+
+def test_chunks_of_nothing_but_negative_zeros_come_back_as_such(store: ReadingStore) -> None:
+    rng = np.random.default_rng(7)
+    trace = _trace(rng, 0, 9, (5, 6))
+    assert trace.head is not None
+    trace = replace(trace, head=replace(trace.head, strip=np.full((5, 6), -0.0, np.float32)))
+    store.write(0, Piece(tuple([GroupReading(trace)] * 8)))
+    found = (open_store(store.root) or store).read(0)
+    assert found is not None
+    assert all(_same(trace, one.trace) for one in found.groups)
 
 
 def test_what_an_earlier_reading_left_behind_is_not_taken_for_this_one(store: ReadingStore) -> None:
