@@ -22,8 +22,8 @@ from benchmarks.speed.passage import FILMED, strung_together
 from benchmarks.speed.reading import filmed_capture
 from gramoscope.apparatus.capture import open_capture
 from gramoscope.player.executors import Executor, Processes
+from gramoscope.player.kept_reading import STORE, Work
 from gramoscope.player.play import Settings, play
-from gramoscope.player.reading import STORE, Work
 from gramoscope.player.recipe import load_recipe
 
 WORKERS = 2

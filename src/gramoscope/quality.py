@@ -29,6 +29,7 @@ class Quality(IntFlag):
     EDGE = 256
     DECLICKED = 512
     DECRACKLED = 1024
+    SILENCE = 2048
 
 
 _MEANINGS: dict[Quality, str] = {
@@ -43,6 +44,7 @@ _MEANINGS: dict[Quality, str] = {
     Quality.EDGE: "at the very start or end of the passage, where only one side supports the value",
     Quality.DECLICKED: "repaired: a click stood here, and the value is what its surroundings predict",
     Quality.DECRACKLED: "repaired: crackle was taken off the measurement here",
+    Quality.SILENCE: "between two passages: no groove is shown, and the sound is silent",
 }
 
 NOT_MEASURED = Quality.INTERPOLATED | Quality.DECLICKED

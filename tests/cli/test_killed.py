@@ -22,9 +22,9 @@ from gramoscope.apparatus.capture import open_capture
 from gramoscope.errors import OutputError
 from gramoscope.player.catalogue import Catalogue
 from gramoscope.player.executors import Executor, Processes
+from gramoscope.player.kept_reading import Work
 from gramoscope.player.monitor import Monitor
 from gramoscope.player.play import Settings, play
-from gramoscope.player.reading import Work
 from gramoscope.player.reading_store import STORE
 from gramoscope.player.recipe import load_recipe
 

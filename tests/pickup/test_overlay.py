@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from gramoscope.pickup.overlay import TILE_COLUMNS, TILE_ROWS, all_tiles, overlay, slope_along, tiles_about
+from gramoscope.pickup.overlay import (
+    PHASES,
+    TILE_COLUMNS,
+    TILE_ROWS,
+    all_tiles,
+    overlay,
+    slope_along,
+    tiles_about,
+    to_phases,
+)
 from gramoscope.pickup.registration import register
 
 SHIFT_PX = np.array([0.0, 2.3, 3.9, 6.75])
@@ -18,12 +27,23 @@ def _film(dtype: type = np.uint8, *, height: int = 2 * TILE_ROWS + 5) -> np.ndar
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
 @pytest.mark.parametrize("height", [1, TILE_ROWS, 2 * TILE_ROWS + 5])
-def test_the_mean_is_that_of_the_canvas(dtype: type, height: int) -> None:
+@pytest.mark.parametrize("shift_px", [SHIFT_PX, np.array([0.0, 2.0, 4.5, 6.5]), np.array([0.25, 3.25, 7.25, 57.25])])
+def test_the_mean_is_that_of_the_canvas(dtype: type, height: int, shift_px: np.ndarray) -> None:
+    """Frames of one fraction of a pixel are added as whole numbers, as far as all of them reach."""
     images = _film(dtype, height=height)
-    laid, canvas = overlay(images, SHIFT_PX, NUMBER), register(images, SHIFT_PX, NUMBER)
+    laid, canvas = overlay(images, shift_px, NUMBER), register(images, shift_px, NUMBER)
     np.testing.assert_allclose(laid.columns.T, canvas.mean, rtol=2e-6, atol=1e-4 * np.iinfo(dtype).max / 255)
     np.testing.assert_array_equal(laid.frames, canvas.frames)
     assert laid.columns.flags.c_contiguous
+
+
+def test_phases_are_few_and_shifts_right_in_the_mean() -> None:
+    shift = np.cumsum(np.r_[0.0, np.random.default_rng(2).uniform(1.5, 2.5, 40)])
+    near = to_phases(shift)
+    assert np.unique(near % 1).size == PHASES
+    assert (near - shift).mean() == pytest.approx(0, abs=1e-6)
+    assert np.abs(near - shift).max() < 0.7 / PHASES
+    np.testing.assert_array_equal(to_phases(shift[:PHASES]), shift[:PHASES])
 
 
 def test_a_ramp_that_moves_with_the_record_stays_a_ramp() -> None:

@@ -15,9 +15,9 @@ from gramoscope.errors import ArgumentError, WorkerError
 from gramoscope.pickup.processor import PROCESSOR
 from gramoscope.player import cluster as cluster_module
 from gramoscope.player.executors import LostWorkerError, Processes, Threads
+from gramoscope.player.kept_reading import Work, kept_reading_of
 from gramoscope.player.pieces import Reader, Task, reader_of
 from gramoscope.player.plan import plan_of
-from gramoscope.player.reading import Work, reading_of
 from gramoscope.player.reading_manifest import key_of
 from gramoscope.player.reading_store import open_store
 from gramoscope.player.recipe import load_recipe
@@ -69,7 +69,7 @@ def _numbers(capture: Path, out: Path, work: Work) -> tuple[list[int], Any]:
     out.mkdir(exist_ok=True)
     opened = open_capture(capture)
     how: dict[str, Any] = {"device": PROCESSOR, "workers": 2, "work": work}
-    with reading_of(opened, RECIPE, out, learn=lambda _: RECIPE.cartridge_for(opened.bench), **how) as reading:
+    with kept_reading_of(opened, RECIPE, out, learn=lambda _: RECIPE.cartridge_for(opened.bench), **how) as reading:
         return [group.trace.number for group in reading.groups()], reading
 
 

@@ -75,7 +75,8 @@ def _transfer(
         catalogue=Catalogue(**words),
         speed=speed if speed is not None else Speed(),
     )
-    capture = SimpleNamespace(folder=Path("films/side-b"), layout="tiff", bench=bench, problems=(), common_files=list)
+    where = {"folder": Path("films/side-b"), "path": Path("films/side-b"), "name": "side-b", "layout": "tiff"}
+    capture = SimpleNamespace(**where, bench=bench, problems=(), common_files=list)
     tracks = {track: metadata_of(track, bench, recipe, settings, capture_name="side-b") for track in tracks_of(recipe)}
     monitor, audio = Monitor(), _audio(flags or Quality(0))
     monitor.heard(audio)
@@ -83,11 +84,10 @@ def _transfer(
         for track in tracks_of(recipe):
             for _ in files.kept(track, [audio], alone if len(track.channels) == 1 else lambda piece: (piece, piece)):
                 pass
-        pickup: Any = SimpleNamespace(walls=("inner", "outer"), calibration={})
+        seen = {"walls": ("inner", "outer"), "calibration": {}, "hashes": InputHashes(), "centring": Centring()}
+        reading: Any = SimpleNamespace(**seen, as_dict=dict, remarks=list)
         anything: Any = capture
-        report = transfer_report(
-            anything, recipe, pickup, settings, InputHashes(), monitor, Centring(), files, folder, 1.0
-        )
+        report = transfer_report(anything, recipe, reading, settings, monitor, files, folder, 1.0)
         files.finish(report, Figure(figsize=(1, 1)), "<p>page</p>")
     return folder
 

@@ -16,10 +16,10 @@ from gramoscope.errors import OutputError
 from gramoscope.pickup.processor import PROCESSOR
 from gramoscope.player import pieces as pieces_module
 from gramoscope.player.folder_lock import folder_lock
+from gramoscope.player.kept_reading import Work
 from gramoscope.player.kept_records import DamagedRecordError, bytes_of, record_of
 from gramoscope.player.pieces import read_group
 from gramoscope.player.play import Settings, play
-from gramoscope.player.reading import Work
 from gramoscope.player.reading_manifest import manifest_of
 from gramoscope.player.reading_store import (
     STORE,
@@ -55,7 +55,17 @@ def _trace(rng: np.random.Generator, number: int, samples: int, strip: tuple[int
     flags = rng.integers(0, 2**15, (2, samples)).astype(np.uint16)
     steps = np.array([8e-7, np.nan, 8.1e-7])[:number]
     return WallTrace(
-        number, 1e-3 * rng.random(), 3e-6, *walls, 5.0, flags, texture, None, steps, np.array([0.7, np.nan]), ("frame 3: ä", "b")
+        number,
+        1e-3 * rng.random(),
+        3e-6,
+        *walls,
+        5.0,
+        flags,
+        texture,
+        None,
+        steps,
+        np.array([0.7, np.nan]),
+        ("frame 3: ä", "b"),
     )
 
 

@@ -35,7 +35,7 @@ SPECTRA: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "speech": _speech,
     "dull speech": _dull,
 }
-WIDE_COST = {"wide": 1.3, "dull speech": 1.35, "1 kHz": 1.35}
+WIDE_COST = {"wide": 1.3, "dull speech": 1.35, "1 kHz": 1.4}
 """What it costs to expect breath, and the record's own noise, where there is none, or that it ends gently where it does not."""
 SURFACE_M_S = 0.03 * 10 ** (-36 / 20)
 """Noise of a record's surface, 36 dB below the loud sounds here: as much as lacquer has, less than shellac."""

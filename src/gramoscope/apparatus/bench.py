@@ -6,7 +6,8 @@ ruler or read off an objective, and the frames may tell a different truth.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
 from gramoscope.camera.sensor import Sensor
 from gramoscope.conventions import INNER, OUTER, row_of_lateral_px
@@ -136,6 +137,10 @@ class Bench:
         lateral_m = groove_middle_m + (distance_m if wall == INNER else -distance_m)
         sensor = self.sensor
         return float(row_of_lateral_px(lateral_m, height_px=sensor.height_px, pixel_pitch_m=sensor.pixel_pitch_m))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the apparatus in plain numbers, SI units."""
+        return {**asdict(self), "focus_through_glass_m": self.focus_through_glass_m, "stripe_rows": self.stripe_rows()}
 
     def stripe_rows(self, groove_middle_m: float = 0.0) -> tuple[float, ...]:
         """Return the canonical rows of `stripes`, in rising order."""

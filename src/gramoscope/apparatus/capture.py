@@ -49,6 +49,16 @@ class Capture:
     log: FrameLog | None = None
 
     @property
+    def name(self) -> str:
+        """Of the folder."""
+        return self.folder.resolve().name
+
+    @property
+    def path(self) -> Path:
+        """What was opened: the folder."""
+        return self.folder
+
+    @property
     def bench(self) -> Bench:
         """The apparatus, canonical."""
         return self.manifest.bench
@@ -105,10 +115,11 @@ class Capture:
     def _group(self, number: int, fill: Callable[[ImageArray, npt.NDArray[np.bool_], _Remarks], None]) -> FrameGroup:
         require(0 <= number < self.group_count, f"group {number}", f"0 … {self.group_count - 1}")
         sequence, sensor = self.bench.sequence, self.bench.sensor
-        images = np.zeros((sequence.frames_per_group, sensor.height_px, sensor.width_px), sensor.dtype)
+        images: ImageArray = np.empty((sequence.frames_per_group, sensor.height_px, sensor.width_px), sensor.dtype)
         valid = np.zeros(sequence.frames_per_group, np.bool_)
         remarks = _Remarks()
         fill(images, valid, remarks)
+        images[~valid] = 0
         arc_start_m, stage_m = self._places(number, remarks)
         return FrameGroup(
             number=number,

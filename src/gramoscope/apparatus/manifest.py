@@ -18,7 +18,7 @@ from pydantic import ValidationError
 from gramoscope.apparatus.bench import Bench
 from gramoscope.apparatus.manifest_bench import bench_of_file, file_of_bench, toml_of_file
 from gramoscope.apparatus.manifest_errors import problems_of, several
-from gramoscope.apparatus.manifest_tables import CaptureFile, FilmFile
+from gramoscope.apparatus.manifest_tables import CaptureFile, FilmFile, Table
 from gramoscope.camera.pattern import FramePattern, require_inside
 from gramoscope.errors import ArgumentError, CaptureError, ManifestError
 
@@ -65,7 +65,7 @@ def read_manifest(path: Path) -> Manifest:
         If a key is missing, unknown or out of its range, or a path leaves the folder. All problems are named at once.
     """
     file = path / MANIFEST_NAME if path.is_dir() else path
-    content = _validated(CaptureFile, _load(file), file=file)
+    content = validated(CaptureFile, load_toml(file), file=file)
     manifest = Manifest(_bench(content, file=file), content.sequence.frames, content.sequence.log)
     try:
         FramePattern(manifest.frames).require_distinct(groups=manifest.bench.sequence.groups)
@@ -94,7 +94,7 @@ def read_bench(path: Path) -> Bench:
         As `read_manifest`.
     """
     file = path / MANIFEST_NAME if path.is_dir() else path
-    return _bench(_validated(FilmFile, _load(file), file=file), file=file)
+    return _bench(validated(FilmFile, load_toml(file), file=file), file=file)
 
 
 def write_manifest(path: Path, bench: Bench, *, frames: str = DEFAULT_FRAMES, log: str | None = None) -> None:
@@ -124,7 +124,8 @@ def write_manifest(path: Path, bench: Bench, *, frames: str = DEFAULT_FRAMES, lo
     path.write_text(toml_of_file(content), encoding="utf-8")
 
 
-def _load(file: Path) -> dict[str, Any]:
+def load_toml(file: Path) -> dict[str, Any]:
+    """Return the content of a manifest, its numbers as decimals; CaptureError or ManifestError if it is none."""
     try:
         return tomllib.loads(file.read_bytes().decode("utf-8-sig"), parse_float=Decimal)
     except (FileNotFoundError, NotADirectoryError):
@@ -143,7 +144,8 @@ def _no_manifest(file: Path) -> CaptureError:
     return CaptureError(found, f"a folder with {MANIFEST_NAME} and frames", "check the path of the capture")
 
 
-def _validated(model: type[FilmFile], content: dict[str, Any], *, file: Path) -> Any:
+def validated(model: type[Table], content: dict[str, Any], *, file: Path) -> Any:
+    """Return the content of a manifest as a model of it; ManifestError that names all problems at once."""
     try:
         return model.model_validate(content)
     except ValidationError as error:

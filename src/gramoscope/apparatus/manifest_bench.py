@@ -26,7 +26,7 @@ from gramoscope.turntable.rotation import Rotation
 
 _EXACT = Context(prec=2000, traps=[Inexact])
 _PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494459")
-_MICRO, _MILLI = 6, 3
+MICRO, MILLI = 6, 3
 
 
 def bench_of_file(content: FilmFile) -> Bench:
@@ -49,34 +49,34 @@ def bench_of_file(content: FilmFile) -> Bench:
     return Bench(
         disc=Disc(
             cut=disc.cut,
-            groove_width_m=_si(disc.groove_width_um, _MICRO),
-            wall_angle_rad=_rad(disc.wall_angle_deg),
+            groove_width_m=si_of(disc.groove_width_um, MICRO),
+            wall_angle_rad=rad_of(disc.wall_angle_deg),
             characteristic=disc.characteristic,
             notes={name: text for name in NOTES if (text := getattr(disc, name)) is not None},
         ),
         rotation=Rotation(
-            rpm=float(disc.rpm), radius_m=_si(disc.radius_mm, _MILLI), pitch_m=_si(disc.pitch_um, _MICRO)
+            rpm=float(disc.rpm), radius_m=si_of(disc.radius_mm, MILLI), pitch_m=si_of(disc.pitch_um, MICRO)
         ),
         objective=Objective(
             magnification=float(microscope.magnification),
             numerical_aperture=float(microscope.numerical_aperture),
-            tube_length_m=_si(microscope.tube_length_mm, _MILLI),
+            tube_length_m=si_of(microscope.tube_length_mm, MILLI),
         ),
         cover_glass=None if content.cover_glass is None else _glass(content.cover_glass, content.camera),
         sensor=_sensor(content.camera),
         sequence=_sequence(content.sequence),
-        focus_below_land_m=_si(microscope.focus_below_land_um, _MICRO),
+        focus_below_land_m=si_of(microscope.focus_below_land_um, MICRO),
     )
 
 
 def _glass(table: CoverGlassTable, camera: CameraTable) -> CoverGlass:
     edge, shift = table.edge_row, table.focus_shift_um
     return CoverGlass(
-        thickness_m=_si(table.thickness_mm, _MILLI),
+        thickness_m=si_of(table.thickness_mm, MILLI),
         refractive_index=float(table.refractive_index),
         side=_mirrored_side(table.side, rows=camera.rows),
         edge_row=None if edge is None else float(_mirrored_row(edge, height_px=camera.height_px, rows=camera.rows)),
-        focus_shift_m=None if shift is None else _si(shift, _MICRO),
+        focus_shift_m=None if shift is None else si_of(shift, MICRO),
     )
 
 
@@ -86,7 +86,7 @@ def _sensor(camera: CameraTable) -> Sensor:
         height_px=camera.height_px,
         bits=camera.bits,
         colour=camera.colour,
-        pixel_pitch_m=_si(camera.pixel_pitch_um, _MICRO),
+        pixel_pitch_m=si_of(camera.pixel_pitch_um, MICRO),
         columns=camera.columns,
         rows=camera.rows,
     )
@@ -96,8 +96,8 @@ def _sequence(table: FilmSequenceTable) -> Sequence:
     return Sequence(
         groups=table.groups,
         frames_per_group=table.frames_per_group,
-        frame_step_m=_si(table.frame_step_um, _MICRO),
-        group_step_m=_si(table.group_step_um, _MICRO),
+        frame_step_m=si_of(table.frame_step_um, MICRO),
+        group_step_m=si_of(table.group_step_um, MICRO),
     )
 
 
@@ -130,19 +130,19 @@ def file_of_bench(bench: Bench, *, frames: str, log: str | None) -> dict[str, An
         "format": FORMAT,
         "disc": {
             "cut": disc.cut,
-            "rpm": _decimal(rotation.rpm),
-            "radius_mm": _shifted(rotation.radius_m, _MILLI),
-            "groove_width_um": _shifted(disc.groove_width_m, _MICRO),
-            "wall_angle_deg": _deg(disc.wall_angle_rad),
-            "pitch_um": _shifted(rotation.pitch_m, _MICRO),
+            "rpm": decimal_of(rotation.rpm),
+            "radius_mm": shifted(rotation.radius_m, MILLI),
+            "groove_width_um": shifted(disc.groove_width_m, MICRO),
+            "wall_angle_deg": deg_of(disc.wall_angle_rad),
+            "pitch_um": shifted(rotation.pitch_m, MICRO),
             "characteristic": disc.characteristic,
             **{name: disc.notes.get(name) for name in NOTES},
         },
         "microscope": {
-            "magnification": _decimal(objective.magnification),
-            "numerical_aperture": _decimal(objective.numerical_aperture),
-            "tube_length_mm": _shifted(objective.tube_length_m, _MILLI),
-            "focus_below_land_um": _shifted(bench.focus_below_land_m, _MICRO),
+            "magnification": decimal_of(objective.magnification),
+            "numerical_aperture": decimal_of(objective.numerical_aperture),
+            "tube_length_mm": shifted(objective.tube_length_m, MILLI),
+            "focus_below_land_um": shifted(bench.focus_below_land_m, MICRO),
         },
         "cover_glass": _glass_table(bench.cover_glass, sensor),
         "camera": {
@@ -150,7 +150,7 @@ def file_of_bench(bench: Bench, *, frames: str, log: str | None) -> dict[str, An
             "height_px": sensor.height_px,
             "bits": sensor.bits,
             "colour": sensor.colour,
-            "pixel_pitch_um": _shifted(sensor.pixel_pitch_m, _MICRO),
+            "pixel_pitch_um": shifted(sensor.pixel_pitch_m, MICRO),
             "columns": sensor.columns,
             "rows": sensor.rows,
         },
@@ -158,12 +158,12 @@ def file_of_bench(bench: Bench, *, frames: str, log: str | None) -> dict[str, An
             "frames": frames,
             "groups": sequence.groups,
             "frames_per_group": sequence.frames_per_group,
-            "frame_step_um": _shifted(sequence.frame_step_m, _MICRO),
-            "group_step_um": _shifted(sequence.group_step_m, _MICRO),
+            "frame_step_um": shifted(sequence.frame_step_m, MICRO),
+            "group_step_um": shifted(sequence.group_step_m, MICRO),
             "log": log,
         },
     }
-    return _without_none(tables)
+    return without_none(tables)
 
 
 def _glass_table(glass: CoverGlass | None, sensor: Sensor) -> dict[str, Any] | None:
@@ -171,19 +171,20 @@ def _glass_table(glass: CoverGlass | None, sensor: Sensor) -> dict[str, Any] | N
         return None
     edge, shift = glass.edge_row, glass.focus_shift_m
     return {
-        "thickness_mm": _shifted(glass.thickness_m, _MILLI),
-        "refractive_index": _decimal(glass.refractive_index),
+        "thickness_mm": shifted(glass.thickness_m, MILLI),
+        "refractive_index": decimal_of(glass.refractive_index),
         "edge_row": None
         if edge is None
-        else _mirrored_row(_decimal(edge), height_px=sensor.height_px, rows=sensor.rows),
+        else _mirrored_row(decimal_of(edge), height_px=sensor.height_px, rows=sensor.rows),
         "side": _mirrored_side(glass.side, rows=sensor.rows),
-        "focus_shift_um": None if shift is None else _shifted(shift, _MICRO),
+        "focus_shift_um": None if shift is None else shifted(shift, MICRO),
     }
 
 
-def _without_none(table: Mapping[str, Any]) -> dict[str, Any]:
+def without_none(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Return tables without the keys that have no value."""
     return {
-        key: _without_none(value) if isinstance(value, Mapping) else value
+        key: without_none(value) if isinstance(value, Mapping) else value
         for key, value in table.items()
         if value is not None
     }
@@ -198,7 +199,9 @@ def toml_of_file(content: Mapping[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _toml(value: str | int | Decimal) -> str:
+def _toml(value: str | int | Decimal | list[str]) -> str:
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_toml, value)) + "]"
     if isinstance(value, str):
         # JSON escapes what TOML escapes, except for DEL
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
@@ -208,29 +211,34 @@ def _toml(value: str | int | Decimal) -> str:
     return str(value)
 
 
-def _si(value: Decimal, places: int) -> float:
+def si_of(value: Decimal, places: int) -> float:
+    """Return a number of the file in SI units, so many decimal places smaller."""
     return float(value.scaleb(-places, _EXACT))
 
 
-def _decimal(value: float) -> Decimal:
+def decimal_of(value: float) -> Decimal:
+    """Return the shortest decimal that is read back as the same number."""
     return Decimal(repr(float(value)))
 
 
-def _shifted(value_m: float, places: int) -> Decimal:
-    return _decimal(value_m).scaleb(places, _EXACT)
+def shifted(value_m: float, places: int) -> Decimal:
+    """Return an SI number as the file has it, so many decimal places larger."""
+    return decimal_of(value_m).scaleb(places, _EXACT)
 
 
-def _rad(angle_deg: Decimal) -> float:
+def rad_of(angle_deg: Decimal) -> float:
+    """Return an angle of the file in radians."""
     # as conventions.rad, but for decimals: through a binary number of degrees not every angle could be written
     with localcontext(prec=50):
         return float(angle_deg * _PI / 180)
 
 
-def _deg(angle_rad: float) -> Decimal:
+def deg_of(angle_rad: float) -> Decimal:
+    """Return an angle in degrees that `rad_of` reads back to the last bit."""
     with localcontext(prec=50):
         exact = Decimal(angle_rad) * 180 / _PI
         shortest = (Decimal(f"{exact:.{digits}g}") for digits in range(1, 40))
-        return next((angle for angle in shortest if _rad(angle) == angle_rad), exact)
+        return next((angle for angle in shortest if rad_of(angle) == angle_rad), exact)
 
 
 def _mirrored_row(row: Decimal, *, height_px: int, rows: Literal["inward", "outward"]) -> Decimal:

@@ -88,6 +88,8 @@ def range_of(field: FieldInfo) -> str:
         return " or ".join(f'"{choice}"' for choice in get_args(field.annotation))
     if any(isinstance(kind, type) and issubclass(kind, BaseModel) for kind in kinds):
         return "a table"
+    if list[str] in kinds:
+        return "a list of texts" + (", one at least" if any(isinstance(m, MinLen) for m in field.metadata) else "")
     if str in kinds:
         return "text"
     noun = "a whole number" if int in kinds else "a number"

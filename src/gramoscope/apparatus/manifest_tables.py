@@ -27,11 +27,13 @@ Note = Annotated[str | None, BeforeValidator(_text)]
 Count = Annotated[int, Field(strict=True)]
 
 
-class _Table(BaseModel):
+class Table(BaseModel):
+    """A table of the file: no other keys than its own."""
+
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class DiscTable(_Table):
+class DiscTable(Table):
     """The record."""
 
     cut: Literal["lateral", "vertical", "stereo"]
@@ -49,7 +51,7 @@ class DiscTable(_Table):
     date: Note = None
 
 
-class MicroscopeTable(_Table):
+class MicroscopeTable(Table):
     """The objective, and where its sharp plane lies without glass."""
 
     magnification: Number = Field(gt=0, le=1000)
@@ -58,7 +60,7 @@ class MicroscopeTable(_Table):
     focus_below_land_um: Number = Field(default=Decimal(20), ge=-1000, le=1000)
 
 
-class CoverGlassTable(_Table):
+class CoverGlassTable(Table):
     """The glass over half the field."""
 
     thickness_mm: Number = Field(gt=0, le=10)
@@ -68,7 +70,7 @@ class CoverGlassTable(_Table):
     focus_shift_um: Number | None = Field(default=None, gt=0, le=10_000)
 
 
-class CameraTable(_Table):
+class CameraTable(Table):
     """The camera, and which way round it looks."""
 
     width_px: Count = Field(ge=16, le=65_536)
@@ -80,7 +82,7 @@ class CameraTable(_Table):
     rows: Literal["inward", "outward"]
 
 
-class FilmSequenceTable(_Table):
+class FilmSequenceTable(Table):
     """How the film is to be taken."""
 
     frames: str | None = None
@@ -98,7 +100,7 @@ class SequenceTable(FilmSequenceTable):
     groups: Count = Field(ge=1, le=10_000_000)
 
 
-class FilmFile(_Table):
+class FilmFile(Table):
     """A bench for filming."""
 
     format: Literal["gramoscope-capture/1"]

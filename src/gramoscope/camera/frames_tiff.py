@@ -108,7 +108,7 @@ def _page(tiff: tifffile.TiffFile, index: int, *, path: Path, sensor: Sensor) ->
     if (key.imagewidth, key.imagelength) != (sensor.width_px, sensor.height_px):
         raise ValueError(wrong_size(key.imagewidth, key.imagelength, sensor=sensor))
     try:
-        frame: Frame = page.asarray()
+        frame: Frame = _as_it_lies(tiff, page) if page.is_final else page.asarray()
     except ValueError as error:
         if "imagecodecs" not in str(error):
             raise
@@ -116,6 +116,15 @@ def _page(tiff: tifffile.TiffFile, index: int, *, path: Path, sensor: Sensor) ->
     if key.photometric == _WHITE_IS_ZERO:
         frame = np.asarray(2**key.bitspersample - 1 - frame, frame.dtype)
     return np.moveaxis(frame, 0, -1) if frame.ndim == 3 and key.planarconfig == _PLANAR else frame
+
+
+def _as_it_lies(tiff: tifffile.TiffFile, page: Any) -> Frame:
+    """Return a page that is stored as an array, read without a detour."""
+    frame = np.empty(page.shape, tiff.byteorder + page.dtype.char)
+    tiff.filehandle.seek(page.dataoffsets[0])
+    if tiff.filehandle.readinto(frame) != frame.nbytes:
+        raise ValueError("the file ends within a page")
+    return frame.astype(page.dtype, copy=False)
 
 
 def _page_by_pillow(path: Path, index: int) -> Frame:
@@ -135,6 +144,21 @@ def _channel_pages(tiff: tifffile.TiffFile, *, frames: int) -> int:
     series = tiff.series[0]
     apart = series.axes.endswith("CYX") and series.shape[-3] == 3
     return 3 if apart and len(series.pages) == 3 * frames else 1
+
+
+def read_first_page(path: Path) -> Frame | Lost:
+    """Return the first picture of a TIFF, whatever its size, or why there is none."""
+    try:
+        with quiet_log():
+            tiff = tifffile.TiffFile(path)
+        with tiff:
+            key: Any = tiff.pages[0].keyframe
+            size = Sensor(width_px=key.imagewidth, height_px=key.imagelength)
+            return _colours(tiff, 0, channels=_channel_pages(tiff, frames=1), path=path, sensor=size)
+    except FileNotFoundError:
+        return Lost(f"{path.name} is missing")
+    except Exception as error:  # decoders raise whatever they like at a broken file
+        return Lost(f"{path.name} cannot be read ({words_of(error)})")
 
 
 def write_tiff(path: Path, frames: Frame, *, compress: bool = False) -> None:

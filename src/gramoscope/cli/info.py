@@ -33,7 +33,7 @@ def info(
     Parameters
     ----------
     capture
-        Folder with `capture.toml` and frames.
+        Folder with `capture.toml` and frames or pictures, or one picture.
     quick
         Read a few groups only, and see whether the other files are there.
     plan
@@ -48,16 +48,20 @@ def info(
     json
         Print everything as JSON.
     """
-    from gramoscope.apparatus.capture import open_capture
     from gramoscope.apparatus.inspection import inspect
+    from gramoscope.apparatus.opening import opened
+    from gramoscope.apparatus.still import StillCapture
+    from gramoscope.cli.info_still import info_still
     from gramoscope.player.plan import plan_of
     from gramoscope.player.recipe import load_recipe
 
     terminal = Terminal(quiet, json)
-    opened = open_capture(capture)
+    found_there = opened(capture)
+    if isinstance(found_there, StillCapture):
+        return info_still(found_there, terminal, quick=quick)
     with terminal.progress("Looking") as progress:
-        found = inspect(opened, quick=quick, progress=progress)
-    planned = plan_of(opened, load_recipe(recipe), workers) if plan else None
+        found = inspect(found_there, quick=quick, progress=progress)
+    planned = plan_of(found_there, load_recipe(recipe), workers) if plan else None
     terminal.result({**found.as_dict(), "sound": found.sound, **({"plan": asdict(planned)} if planned else {})})
     _tell(terminal, found)
     if planned is not None:

@@ -22,6 +22,7 @@ from gramoscope.cli.pack import pack
 from gramoscope.cli.play import play
 from gramoscope.cli.recipe import recipe
 from gramoscope.cli.terminal import BAD_INPUT, FINE, INTERRUPTED, show_error
+from gramoscope.cli.unroll import unroll
 from gramoscope.errors import GramoscopeError
 from gramoscope.interruption import was_ctrl_c
 
@@ -37,6 +38,7 @@ app = cyclopts.App(
     - `gramoscope demo` films a sound of its own, plays the film and says how well that went;
     - `gramoscope film SOUND CAPTURE` films any sound file;
     - `gramoscope play CAPTURE --out DIR` plays a film;
+    - `gramoscope play PICTURE.png --out DIR` plays a photograph of grooves; `gramoscope unroll` straightens a scan of a disc;
     - `gramoscope pack DIR` makes a package for an archive of it.
 
     Exit codes: 0 all is well; 1 `info` found something wrong; 2 the command cannot work as given; 130 stopped by Ctrl-C.
@@ -47,7 +49,7 @@ app = cyclopts.App(
     result_action="return_value",
     default_parameter=cyclopts.Parameter(negative=()),
 )
-for command in (demo, film, play, compare, info, recipe, characteristics, pack):
+for command in (demo, film, play, compare, info, recipe, characteristics, pack, unroll):
     app.command(command)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+from gramoscope.cli.picture_options import AS_IT_IS, PictureOptions
 from gramoscope.cli.terminal import FINE, FINITE, PROCESSORS, Terminal, Workers, several
 
 SHOWN_GROUPS = 8
@@ -17,7 +18,7 @@ def play(
     /,
     *,
     out: Path | None = None,
-    recipe: str = "best",
+    recipe: str | None = None,
     rate: int = 96_000,
     characteristic: str | None = None,
     declick: bool = False,
@@ -32,6 +33,8 @@ def play(
     originator: str = "",
     reference: str = "",
     description: str = "",
+    groove: int | None = None,
+    picture: PictureOptions = AS_IT_IS,
     again: Path | None = None,
     force: bool = False,
     workers: Workers = PROCESSORS,
@@ -46,7 +49,7 @@ def play(
     quiet: bool = False,
     json: bool = False,
 ) -> int:
-    """Play a filmed record.
+    """Play a filmed record, or photographs of its grooves.
 
     Writes into DIR, all of them or nothing: `flat.wav` (velocity of the groove in the direction of the cut, no equalisation),
     `walls.wav` (outer and inner wall for themselves), `vertical.wav` (up and down), `equalised.wav`, each Broadcast Wave of
@@ -66,12 +69,13 @@ def play(
     Parameters
     ----------
     capture
-        Folder with `capture.toml` and frames; may be left out with --again.
+        Folder with `capture.toml` and frames or pictures, or one picture (PNG, TIFF, JPEG, BMP); may be left out with --again.
     out
         Folder for the results; made if it does not exist. An earlier transfer in it is replaced. With --again it may be left
         out: a folder beside that of the report, with `-again` after its name.
     recipe
-        How to read: a name that ships with us, or a TOML file. `gramoscope recipe` shows them.
+        How to read: a name that ships with us, or a TOML file. `gramoscope recipe` shows them. When left out, best for films
+        and stills for photographs.
     rate
         Samples a second.
     characteristic
@@ -108,6 +112,8 @@ def play(
     description
         What the files shall say first of themselves, 256 characters at the most; title, performer, label, matrix, side and
         date of the capture when left out.
+    groove
+        Of photographs: play this groove alone, counted from 1 in playing order.
     again
         A `report.json`: repeat its transfer bit for bit, with its recipe, settings and words, from the same capture. What
         differs is told: other versions, other sums.
@@ -146,7 +152,7 @@ def play(
         from gramoscope.cli.play_again import play_again
 
         return play_again(play, locals())
-    from gramoscope.apparatus.capture import open_capture
+    from gramoscope.apparatus.opening import opened
     from gramoscope.cli.watch import at_work
     from gramoscope.errors import ArgumentError
     from gramoscope.player.catalogue import Catalogue
@@ -154,7 +160,7 @@ def play(
     from gramoscope.player.following import follow as follow_film
     from gramoscope.player.play import Settings
     from gramoscope.player.play import play as play_capture
-    from gramoscope.player.recipe import load_recipe, with_repairs
+    from gramoscope.player.recipe import load_recipe, recipe_for, with_repairs
     from gramoscope.player.speed import Speed
 
     if capture is None or out is None:
@@ -163,11 +169,16 @@ def play(
         )
     terminal = Terminal(quiet, json)
     following = follow_film(capture) if follow else None
-    opened = open_capture(capture) if following is None else following.capture
-    name = characteristic or opened.bench.disc.characteristic or "riaa"
+    played = opened(capture, picture.manifest(rpm)) if following is None else following.capture
+    name = characteristic or played.bench.disc.characteristic or "riaa"
     catalogue = Catalogue(title=title, originator=originator, reference=reference, description=description)
-    chosen = with_repairs(load_recipe(recipe), declick=declick, decrackle=decrackle, rumble_hz=rumble_hz)
+    chosen = with_repairs(
+        load_recipe(recipe or recipe_for(played)), declick=declick, decrackle=decrackle, rumble_hz=rumble_hz
+    )
     speed, where = Speed.chosen(rpm, speed_curve, remove_wow=remove_wow), device_named(device)
+    if played.layout == "stills" and speed.rpm == played.bench.rotation.rpm:
+        # it is the picture's own speed, not another one
+        speed = Speed.chosen(None, speed_curve, remove_wow=remove_wow)
     settings = Settings(
         rate_hz=float(rate),
         characteristic_name=name,
@@ -177,10 +188,11 @@ def play(
         catalogue=catalogue,
         speed=speed,
         device=where,
+        groove=groove,
     )
     how = {"restart": restart, "keep_reading": keep_reading, "verify": verify, "following": following}
     with at_work(terminal, out, executor, scheduler, workers, json_progress=json_progress, **how) as (progress, work):
-        report = play_capture(opened, chosen, out, settings, progress=progress, work=work)
+        report = play_capture(played, chosen, out, settings, progress=progress, work=work)
     terminal.result(report)
     tell(terminal, report, out)
     return FINE
@@ -192,7 +204,7 @@ def tell(terminal: Terminal, report: Mapping[str, Any], out: Path) -> None:
     rows = {
         "played": f"{report['seconds']:.3f} s in {report['elapsed_s']:.1f} s, recipe {report['recipe'].get('name', '?')}",
         "speed": _speed(report["speed"]),
-        "groups": _groups(report),
+        **({"grooves": _grooves(report["grooves"])} if "grooves" in report else {"groups": _groups(report)}),
         "measured": f"{share['measured']:.1%} of the sound; {share['interpolated']:.1%} interpolated and flagged",
         "level": f"{level['rms_cm_s']:.2f} cm/s rms, {level['peak_cm_s']:.1f} cm/s peak",
         "noise": f"{noise['sigma_rms_cm_s']:.2f} cm/s rms by the error bars, {_below(noise)}",
@@ -219,6 +231,7 @@ def _names(report: Mapping[str, Any]) -> list[str]:
     return [
         *(name for names in sounds for name in names),
         *cue_files_of(report),
+        *(report["grooves"][which] for which in ("table", "edges", "labels") if "grooves" in report),
         "groove.png",
         "report.html",
         "report.json",
@@ -245,6 +258,14 @@ def _groups(report: Mapping[str, Any]) -> str:
     shown = ", ".join(str(number) for number in numbers[:SHOWN_GROUPS]) + (", …" if len(numbers) > SHOWN_GROUPS else "")
     which = f" ({shown})" if numbers else ""
     return f"{groups['read']} read, {groups['lost']} lost{which}; {several(report['frames_lost'], 'frame')} lost"
+
+
+def _grooves(grooves: Mapping[str, Any]) -> str:
+    spans = [f"{row['groove']}: {row['start_s']:.4f} … {row['stop_s']:.4f} s" for row in grooves["played"]]
+    shown = ", ".join(spans[:SHOWN_GROUPS]) + (", …" if len(spans) > SHOWN_GROUPS else "")
+    turns = sum(row["turns"] for row in grooves["played"])
+    joined = f", of {several(turns, 'turn')}" if grooves["turn_px"] is not None else ""
+    return f"{len(spans)} in {several(grooves['pictures'], 'picture')}{joined} ({shown})"
 
 
 def _below(noise: Mapping[str, float]) -> str:

@@ -25,7 +25,6 @@ def play_again(command: Callable[..., int], chosen: Mapping[str, Any]) -> int:
     chosen : mapping
         Option → value; those that say what to do must be left as they are, for the report says it.
     """
-    from gramoscope.apparatus.capture import open_capture
     from gramoscope.cli.play import tell
     from gramoscope.cli.watch import at_work
     from gramoscope.player.again import load_again
@@ -37,7 +36,7 @@ def play_again(command: Callable[..., int], chosen: Mapping[str, Any]) -> int:
     folder = report.resolve().parent
     out: Path = chosen["out"] or folder.with_name(f"{folder.name}-again")
     terminal = Terminal(chosen["quiet"], chosen["json"])
-    capture = open_capture(again.capture_folder(chosen["capture"]))
+    capture = again.opened(again.capture_folder(chosen["capture"]))
     again.require_same_files_in_common(capture)
     settings = again.settings(capture, chosen["workers"])
     for name, one in again.other_versions().items():

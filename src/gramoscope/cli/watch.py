@@ -15,9 +15,9 @@ from gramoscope.cli.terminal import Terminal
 from gramoscope.listening.whole_file import temporary_sibling
 from gramoscope.player.executors import Executor, Processes
 from gramoscope.player.following import Following
+from gramoscope.player.kept_reading import Work
 from gramoscope.player.live_meter import LiveMeter
 from gramoscope.player.monitor import Monitor
-from gramoscope.player.reading import Work
 from gramoscope.player.reading_store import STORE
 from gramoscope.signal_path import WallTrace
 

@@ -29,6 +29,8 @@ BoolArray = npt.NDArray[np.bool_]
 
 STRIPE_COLOURS = (ink.ORANGE, ink.SKY, ink.YELLOW, ink.PURPLE)
 FILLED_IN = (0, (4, 3))
+TALLEST_IN = 9.0
+"""Pictures that would be taller are drawn narrower."""
 LONGEST_LINE = 135
 """Letters of stripes' names that fit side by side."""
 
@@ -82,6 +84,7 @@ def groove_figure(
     glass_edge_row: float | None,
     waveform: tuple[FloatArray, FloatArray, FloatArray, BoolArray],
     title: str,
+    heading: str = "One frame, and the stripes found in it",
 ) -> Figure:
     """Draw one frame with the stripes found in it, and below it the sound of the whole passage.
 
@@ -98,7 +101,8 @@ def groove_figure(
         Canonical row; None draws no edge.
     waveform : (time_s, velocity_m_s, sigma_m_s, interpolated)
         As in `Waveform`; a long one is drawn by its extremes. Two sigma are drawn about it, and interpolated spans shaded.
-    title : str
+    title, heading : str
+        Of all, and of the frame.
 
     Returns
     -------
@@ -112,7 +116,7 @@ def groove_figure(
     require(image.ndim == 2, f"an image of shape {image.shape}", "shape (row, column)")
     sound = Waveform(*waveform)
     require(len({len(part) for part in sound}) == 1, "a waveform whose parts differ in length", "equal lengths")
-    height_in = 10.5 * image.shape[0] / image.shape[1]
+    height_in = min(10.5 * image.shape[0] / image.shape[1], TALLEST_IN)
     figure = ink.blank_figure(11.0, height_in + 5.2)
     figure.suptitle(title, x=0.012, ha="left", fontsize=ink.LARGE, color=ink.BLACK)
     above, below = figure.subplots(2, 1, height_ratios=[height_in, 3.0])
@@ -121,7 +125,7 @@ def groove_figure(
         _draw_stripe(above, StripeLine(*line), colour=colour, height_px=image.shape[0], pixel_pitch_m=pixel_pitch_m)
     if glass_edge_row is not None:
         _draw_glass_edge(above, float(_lateral_um(glass_edge_row, image.shape[0], pixel_pitch_m)))
-    _name_stripes(above, [line[0] for line in stripes])
+    _name_stripes(above, [line[0] for line in stripes], heading)
     draw_waveform(below, sound)
     return figure
 
@@ -185,9 +189,9 @@ def _draw_stripe(axes: Axes, line: StripeLine, *, colour: str, height_px: int, p
     axes.plot(arc_um, filled, color=colour, linewidth=1.4, linestyle=FILLED_IN)
 
 
-def _name_stripes(axes: Axes, names: Sequence[str]) -> None:
+def _name_stripes(axes: Axes, names: Sequence[str], heading: str) -> None:
     """Write the heading, and below it which line is which; long names stand in two columns."""
-    heading = "One frame, and the stripes found in it"
+    names = [name for name in names if not name.startswith("_")]
     if not names:
         ink.heading(axes, heading)
         return

@@ -14,14 +14,14 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from gramoscope.conventions import BoolArray, Float32Array, FloatArray
+from gramoscope.conventions import BoolArray, Float32Array, FloatArray, IntArray
 from gramoscope.pickup.device import Kept
 from gramoscope.pickup.registration import cubic_taps, placement
 from gramoscope.signal_path import ImageArray
 
 TILE_ROWS, TILE_COLUMNS = 16, 64
 """So much of the picture is wanted or not. Sixteen rows are averaged before they are written: a cache line of each column."""
-RUN_TILES = 4
+RUN_TILES = 8
 """So many tiles at most are averaged at a time: what they add up to stays near."""
 
 
@@ -73,28 +73,73 @@ def _write(total, share, first, columns):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _overlay_run(film, shape, shift_px, share, rows, run, total, columns):  # type: ignore[no-untyped-def]
-    """Average some rows of a run of columns."""
-    frames, height, width = shape
-    first, stop_row = rows
-    left, right = run
-    part = total[: stop_row - first]
-    part[:] = np.float32(0)
-    for k in range(frames):
-        start, stop, offset, fraction = placement(shift_px[k], width, columns.shape[0])
-        start, stop = max(start, left), min(stop, right)
-        if stop > start:
-            pixel = (k * height + first) * width + start + offset - 1
-            _add_frame(film, pixel, width, cubic_taps(fraction), start - left, stop - left, part)
-    _write(part, share[left:right], first, columns[left:right])
+def _add_integers(film, first, into):  # type: ignore[no-untyped-def]
+    """Add pixels of a film as one line to a line of sums."""
+    here = np.uint64(first)
+    for x in range(np.uint64(into.size)):
+        into[x] += film[here + x]
+
+
+@numba.njit(cache=True, nogil=True, fastmath={"contract"})
+def _interpolate(sums, taps, total):  # type: ignore[no-untyped-def]
+    """Add sums of pixels, at one fraction of a pixel; they begin a column before the total."""
+    w0, w1, w2, w3 = np.float32(taps[0]), np.float32(taps[1]), np.float32(taps[2]), np.float32(taps[3])
+    one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
+    for x in range(np.uint64(total.size)):
+        near = w0 * np.float32(sums[x]) + w1 * np.float32(sums[x + one])
+        total[x] += near + w2 * np.float32(sums[x + two]) + w3 * np.float32(sums[x + three])
 
 
 @numba.njit(cache=True, nogil=True)
-def _overlay(film, shape, shift_px, share, wanted, columns):  # type: ignore[no-untyped-def]
+def _add_frames(film, shape, places, taps, rows, run, sums, total):  # type: ignore[no-untyped-def]
+    """Add frames that lie at one fraction of a pixel to some rows of a run of columns.
+
+    Where all of them reach they are added up as whole numbers, whose sum is interpolated; the ends of each by itself.
+    """
+    height, width = shape
+    common_start, common_stop = run
+    for _, start, stop, _ in places:
+        common_start, common_stop = max(common_start, start), min(common_stop, stop)
+    if common_stop <= common_start:
+        common_start = common_stop = run[1]
+    line = sums[: common_stop - common_start + 3]
+    for j in range(rows[1] - rows[0]):
+        if common_stop > common_start:
+            line[:] = 0
+            for k, _, _, offset in places:
+                _add_integers(film, (k * height + rows[0] + j) * width + common_start + offset - 1, line)
+            _interpolate(line, taps, total[j, common_start - run[0] : common_stop - run[0]])
+    for k, start, stop, offset in places:
+        pixel = (k * height + rows[0]) * width + offset - 1
+        for first, last in (
+            (max(start, run[0]), min(stop, common_start)),
+            (max(start, common_stop), min(stop, run[1])),
+        ):
+            if last > first:
+                _add_frame(film, pixel + first, width, taps, first - run[0], last - run[0], total)
+
+
+@numba.njit(cache=True, nogil=True)
+def _overlay_run(film, shape, places, fraction, share, rows, run, sums, total, columns):  # type: ignore[no-untyped-def]
+    """Average some rows of a run of columns."""
+    part = total[: rows[1] - rows[0]]
+    part[:] = np.float32(0)
+    first = 0
+    while first < len(places):
+        last = first
+        while last < len(places) and fraction[last] == fraction[first]:
+            last += 1
+        _add_frames(film, shape, places[first:last], cubic_taps(fraction[first]), rows, run, sums, part)
+        first = last
+    _write(part, share[run[0] : run[1]], rows[0], columns[run[0] : run[1]])
+
+
+@numba.njit(cache=True, nogil=True)
+def _overlay(film, shape, places, fraction, share, wanted, sums, columns):  # type: ignore[no-untyped-def]
     tiles = wanted.shape[1]
     total = np.empty((TILE_ROWS, RUN_TILES * TILE_COLUMNS), np.float32)
     for block in range(wanted.shape[0]):
-        rows = (block * TILE_ROWS, min((block + 1) * TILE_ROWS, shape[1]))
+        rows = (block * TILE_ROWS, min((block + 1) * TILE_ROWS, shape[0]))
         tile = 0
         while tile < tiles:
             first = tile
@@ -102,7 +147,7 @@ def _overlay(film, shape, shift_px, share, wanted, columns):  # type: ignore[no-
                 tile += 1
             if tile > first:
                 run = (first * TILE_COLUMNS, min(tile * TILE_COLUMNS, columns.shape[0]))
-                _overlay_run(film, shape, shift_px, share, rows, run, total, columns)
+                _overlay_run(film, shape, places, fraction, share, rows, run, sums, total, columns)
             else:
                 tile += 1
 
@@ -158,7 +203,8 @@ def overlay(
     ----------
     images : uint8 or uint16 array, shape (frame, row, column)
     shift_px : float64 array, shape (frame,)
-        ≥ 0, how far the record has turned since the first frame.
+        How far the record has turned since the first frame; frames whose shifts have the same fraction are quicker to lay
+        over each other, see `to_phases`.
     frame_index : int64 array, shape (frame,)
         Number of each frame in running order.
     wanted : bool array, shape (tile of rows, tile of columns), optional
@@ -176,12 +222,47 @@ def overlay(
     tiles = all_tiles((height, canvas_width)) if wanted is None else wanted
     share = (1 / np.maximum(counts, 1)).astype(np.float32)
     film = np.ascontiguousarray(images)
-    _overlay(film.reshape(-1), film.shape, shift_px, share, tiles, columns)
+    places, fraction = _by_fraction(shift_px, width, canvas_width)
+    sums = np.empty(RUN_TILES * TILE_COLUMNS + 3, sum_type(images))
+    _overlay(film.reshape(-1), (height, width), places, fraction, share, tiles, sums, columns)
     covered = np.flatnonzero(counts)
     if covered.size:
         columns[: covered[0]] = columns[covered[0]]
         columns[covered[-1] + 1 :] = columns[covered[-1]]
     return Overlay(columns, counts, shift_px, frame_index)
+
+
+def _by_fraction(shift_px: FloatArray, width: int, canvas_width: int) -> tuple[IntArray, FloatArray]:
+    """Return number, first and last but one column, and own column minus theirs, of all frames, and their fractions, sorted."""
+    found = [(*placement(shift, width, canvas_width), k) for k, shift in enumerate(shift_px.tolist())]
+    found.sort(key=lambda one: one[3:])
+    places = np.array([(k, start, stop, offset) for start, stop, offset, _, k in found], np.int64)
+    return places.reshape(-1, 4), np.array([one[3] for one in found])
+
+
+def sum_type(images: ImageArray) -> type[np.uint16] | type[np.uint32]:
+    """Return the narrowest whole numbers that hold the sum of all frames."""
+    small = images.dtype == np.uint8 and len(images) <= np.iinfo(np.uint16).max // np.iinfo(np.uint8).max
+    return np.uint16 if small else np.uint32
+
+
+PHASES = 8
+"""Frames lie over each other to an eighth of a pixel: at most so many sums of frames are interpolated, in place of all frames.
+At a third of a cycle a pixel that costs 0.3 % of the texture's amplitude."""
+
+
+def to_phases(shift_px: FloatArray) -> FloatArray:
+    """Return shifts that differ by eighths of a pixel, and from what they were by nothing in the mean.
+
+    Frames with the same fraction of a pixel are laid over each other as whole numbers by `overlay`. The mean counts: it is
+    where the groove is believed to be along itself, and a group that is off by a tenth of a pixel is heard. No more frames
+    than there are phases stay as they are: nothing would be saved, and the errors of few do not average out.
+    """
+    if shift_px.size <= PHASES:
+        return shift_px
+    near: FloatArray = np.rint(PHASES * shift_px) / PHASES
+    # the same fractions to the last bit
+    return near + np.rint((shift_px - near).mean() * 2**20) / 2**20
 
 
 def frames_in(width: int, shift_px: FloatArray) -> npt.NDArray[np.int64]:

@@ -28,7 +28,7 @@ from gramoscope.signal_path import FrameGroup, ImageArray, Texture
 
 STRIP_REACH_PX = 40
 """Strips for matching stretches reach so far beyond their nominal overlap."""
-CONVERGED_PX = 1e-3
+CONVERGED_PX = 2e-3
 """Steps of the shift search below this are no longer worth a round."""
 LARGEST_STEP_PX = 0.5
 REACH_PX = 3.0

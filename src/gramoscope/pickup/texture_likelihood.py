@@ -21,7 +21,7 @@ from gramoscope.conventions import INNER, OUTER, Float32Array, FloatArray, IntAr
 from gramoscope.errors import require
 from gramoscope.pickup.cartridge import Line, Sketch, Spread
 from gramoscope.pickup.device import Device, Film
-from gramoscope.pickup.overlay import TILE_COLUMNS, Overlay, overlay_width, slope_along, tiles_about
+from gramoscope.pickup.overlay import TILE_COLUMNS, Overlay, overlay_width, slope_along, tiles_about, to_phases
 from gramoscope.pickup.processor import Processor
 from gramoscope.pickup.registration import overlap_textures, strip_columns
 from gramoscope.pickup.texture.calibration import aligned_layout, calibration_of
@@ -274,7 +274,8 @@ class TexturePickup:
             Paths of the walls and support of the stripes, as `searched` finds them.
         """
         group, device = film.group, film.device
-        width = overlay_width(group.images.shape[2], sight.shift_px)
+        shift_px = to_phases(sight.shift_px)
+        width = overlay_width(group.images.shape[2], shift_px)
         x = np.arange(width)
         cell: FloatArray = (np.arange(coarse[0].shape[1], dtype=np.float64) + 0.5) * CELL_PX - 0.5
         path = _by_column(coarse[0], x, cell, smooth_cells=1.5)
@@ -289,7 +290,7 @@ class TexturePickup:
         for end in strip_columns(group, width=width, group_step_m=self.cartridge.bench.sequence.group_step_m):
             tiles = slice(end.start // TILE_COLUMNS, -(-end.stop // TILE_COLUMNS))
             wanted[:, tiles] = wanted[:, tiles].any(axis=1, keepdims=True)
-        laid = device.overlay(film, sight.shift_px, np.flatnonzero(group.valid), wanted)
+        laid = device.overlay(film, shift_px, np.flatnonzero(group.valid), wanted)
         usable = laid.frames * 2 >= laid.frames.max()
         burnt = device.places_brighter(laid.columns, NEARLY_WHITE * group.white_level)
         return Stretch(laid.columns, usable, burnt, path, support, device=device), laid

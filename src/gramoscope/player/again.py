@@ -15,14 +15,17 @@ from typing import TYPE_CHECKING, Any, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
-from gramoscope.apparatus.capture import Capture
 from gramoscope.apparatus.fingerprint import sha256_of_file
 from gramoscope.apparatus.manifest import MANIFEST_NAME
+from gramoscope.apparatus.manifest_still import StillManifest
+from gramoscope.apparatus.opening import opened
+from gramoscope.apparatus.still import is_picture
 from gramoscope.errors import ArgumentError, CaptureError, GramoscopeError, require
 from gramoscope.listening.broadcast_metadata import REFERENCE, ascii_text
 from gramoscope.player.catalogue import Catalogue
 from gramoscope.player.devices import device_of_report
 from gramoscope.player.provenance import InputHashes, versions
+from gramoscope.player.reading import AnyCapture
 from gramoscope.player.recipe import Recipe, recipe_of_table
 from gramoscope.player.report import REPORT_FORMAT
 
@@ -54,7 +57,7 @@ class Again:
         here = self.report.get("capture_from_here")
         places: list[Path] = [*([self.path.parent / here] if here else []), Path(self.report["capture"])]
         for place in places:
-            if (place / MANIFEST_NAME).is_file():
+            if (place / MANIFEST_NAME).is_file() or (is_picture(place) and place.is_file()):
                 return place
         raise CaptureError(
             f"the capture of {self.path} is neither at {' nor at '.join(map(str, places))}",
@@ -62,11 +65,24 @@ class Again:
             f"say where it is now: gramoscope play CAPTURE --again {self.path}",
         )
 
+    def opened(self, path: Path) -> AnyCapture:
+        """Open the capture, with what was said of its pictures then."""
+        told = self.report.get("still_manifest")
+        if told is None:
+            return opened(path)
+        try:
+            manifest = TypeAdapter(StillManifest).validate_json(json.dumps(told))
+        except ValidationError as error:
+            raise ArgumentError(
+                f"{self.path}: still_manifest: {error.errors()[0]['msg']}", "as it was written"
+            ) from error
+        return opened(path, manifest if is_picture(path) else StillManifest((), rpm=manifest.rpm))
+
     def recipe(self) -> Recipe:
         """Return the recipe, with every parameter that it had."""
         return recipe_of_table({key: value for key, value in self.report["recipe"].items() if key != "sha256"})
 
-    def settings(self, capture: Capture, workers: int) -> Settings:
+    def settings(self, capture: AnyCapture, workers: int) -> Settings:
         """Return the settings, with the moment of then; a capture with another name keeps the old one as its reference."""
         from gramoscope.player.play import Settings
 
@@ -74,7 +90,7 @@ class Again:
         unknown = sorted(set(self.report["settings"]) - known)
         require(not unknown, f"{self.path} has settings that are unknown here: {', '.join(unknown)}", "", _REMEDY)
         words = dict(self.report["catalogue"])
-        if not words["reference"] and capture.folder.resolve().name != self.report["capture_name"]:
+        if not words["reference"] and capture.name != self.report["capture_name"]:
             words["reference"] = ascii_text(self.report["capture_name"])[:REFERENCE]
         catalogue = Catalogue(**words, made=datetime.fromisoformat(self.report["made"]))
         chosen = self._chosen(get_type_hints(Settings))
@@ -99,7 +115,7 @@ class Again:
             if then.get(name) != now.get(name)
         }
 
-    def require_same_files_in_common(self, capture: Capture) -> None:
+    def require_same_files_in_common(self, capture: AnyCapture) -> None:
         """Look at the manifest and what else all groups share, before anything else is read."""
         found = InputHashes().as_dict(capture)["common_files"]
         self._require(_changed(self.report["inputs"]["common_files"], found))

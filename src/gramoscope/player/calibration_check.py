@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gramoscope.apparatus.bench import Bench
+from gramoscope.apparatus.still_bench import StillBench
 from gramoscope.conventions import MICROMETRES_PER_METRE
 
 AGREES, NEAR = 0.02, 0.1
@@ -16,12 +17,14 @@ AGREES, NEAR = 0.02, 0.1
 VERDICTS = ("as stated", "near: look at it", "not as stated: check the manifest")
 
 
-def calibration_check(bench: Bench, calibration: Mapping[str, Any], seen: Mapping[str, Any]) -> list[dict[str, Any]]:
+def calibration_check(
+    bench: Bench | StillBench, calibration: Mapping[str, Any], seen: Mapping[str, Any]
+) -> list[dict[str, Any]]:
     """Return every quantity that was both stated and found.
 
     Parameters
     ----------
-    bench : Bench
+    bench : Bench or StillBench
         The manifest's.
     calibration : mapping
         Of the pickup; empty for one that learns nothing.
@@ -33,7 +36,7 @@ def calibration_check(bench: Bench, calibration: Mapping[str, Any], seen: Mappin
     list of dict
         `what`, `unit`, `manifest`, `found`, `difference_percent` and `verdict`, one of `VERDICTS`.
     """
-    rows = [*_of_pickup(calibration), *_of_monitor(bench, seen)]
+    rows = [*_of_pickup(calibration), *(_of_monitor(bench, seen) if isinstance(bench, Bench) else ())]
     return [_judged(*row) for row in rows if _known(row[2]) and _known(row[3])]
 
 

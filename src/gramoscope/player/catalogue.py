@@ -9,6 +9,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 from gramoscope.apparatus.bench import Bench
+from gramoscope.apparatus.still_bench import StillBench
 from gramoscope.listening.broadcast_metadata import (
     DESCRIPTION,
     ORIGINATOR,
@@ -57,7 +58,7 @@ class Catalogue:
 
 
 def metadata_of(
-    track: Track, bench: Bench, recipe: Recipe, settings: Settings, *, capture_name: str
+    track: Track, bench: Bench | StillBench, recipe: Recipe, settings: Settings, *, capture_name: str
 ) -> BroadcastMetadata:
     """Return what one sound file of a transfer says of itself."""
     words, disc, program = settings.catalogue, bench.disc, f"Gramoscope {version('gramoscope')}"
@@ -66,7 +67,7 @@ def metadata_of(
     description = _description(words.description or record_in_words(title, disc.notes), track, settings)
     medium = f"gramophone record; {settings.speed.rotation_of(bench.rotation).in_words()}; {disc.cut} cut"
     steps = track.done(settings, recipe)
-    told = (f"recipe {recipe.name}", settings.speed.done(bench.rotation), steps)
+    told = (f"recipe {recipe.name}", settings.speed.done(bench.rotation), _assumed(bench), steps)
     done = "; ".join([program, "optical", *filter(None, told), f"full scale {settings.full_scale_m_s:g} m/s"])
     mode = "mono" if len(track.channels) == 1 else "dual-mono"
     made = words.made.astimezone(UTC)
@@ -94,6 +95,13 @@ def metadata_of(
             "ICMT": f"{track.what}; {steps}",
         },
     )
+
+
+def _assumed(bench: Bench | StillBench) -> str:
+    """What of the scale nobody knows, in ASCII."""
+    if not isinstance(bench, StillBench) or not bench.assumed:
+        return ""
+    return ascii_text("scale not known, assumed: " + ", ".join(bench.assumed))
 
 
 def record_in_words(title: str, notes: Mapping[str, str]) -> str:

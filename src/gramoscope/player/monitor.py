@@ -87,6 +87,7 @@ class Monitor:
     matches_missing: int = 0
     match_square_m2: float = 0.0
     samples: int = 0
+    silence_samples: int = 0
     interpolated: int = 0
     power: float = 0.0
     measured_power: float = 0.0
@@ -121,6 +122,11 @@ class Monitor:
         self.frame_step_sum_m += float(steps.sum())
         self.frame_step_square_m2 += float((steps**2).sum())
 
+    def problem(self, words: str) -> None:
+        """Take note of a problem that belongs to no single stretch."""
+        self.problems_count += 1
+        self.problems += [words] if len(self.problems) < MOST_PROBLEMS else []
+
     def spliced(self, match: Match | None, trace: WallTrace | None = None) -> None:
         """Take note of how a stretch fits the one before."""
         if self.gauge is not None and trace is not None:
@@ -138,7 +144,11 @@ class Monitor:
         return pieces if self.quality is None else self.quality.followed(pieces)
 
     def heard(self, piece: Audio) -> None:
-        """Take note of a piece of the flat transfer."""
+        """Take note of a piece of the flat transfer; silence between two passages is drawn, and counts for nothing else."""
+        if piece.flags.size and bool(np.all(piece.flags & np.uint16(Quality.SILENCE))):
+            self.silence_samples += piece.samples.size
+            self.overview.add(piece)
+            return
         if self.quality is not None:
             self.quality.heard(piece)
         if self.hints is not None:
@@ -219,4 +229,4 @@ def _with_group(problem: str, number: int) -> str:
     return problem if problem.startswith(f"group {number}") else f"group {number}, {problem}"
 
 
-_FLAG_NAMES = tuple(str(flag.name).lower() for flag in Quality if flag not in REPAIRS)
+_FLAG_NAMES = tuple(str(flag.name).lower() for flag in Quality if flag not in REPAIRS | Quality.SILENCE)

@@ -16,7 +16,7 @@ from gramoscope.interruption import ctrl_c_waits
 from gramoscope.listening.broadcast_metadata import BroadcastMetadata
 from gramoscope.listening.ink import save_png
 from gramoscope.listening.report import json_text
-from gramoscope.listening.whole_file import written_whole
+from gramoscope.listening.whole_file import create_temporary, put_in_place, temporary_sibling, written_whole
 from gramoscope.player.cue_list import CUES, LABELS, CueList
 from gramoscope.player.track_file import TrackFile, files_of
 from gramoscope.player.tracks import EQUALISED, FLAT, REPAIR_TRACKS, VERTICAL, WALLS, Track
@@ -26,6 +26,9 @@ REPORT, PAGE, PICTURE = "report.json", "report.html", "groove.png"
 _STEMS = {Path(name).stem for name in (REPORT, PAGE, PICTURE, CUES, LABELS)} | {
     Path(track.name).stem for track in (FLAT, WALLS, VERTICAL, EQUALISED, *REPAIR_TRACKS)
 }
+GROOVES, EDGES, GROOVE_LABELS = "grooves.csv", "edges.npz", "grooves.txt"
+BESIDE = (GROOVES, EDGES, GROOVE_LABELS)
+"""Files that only the photographs of grooves have beside their sound."""
 Piece = TypeVar("Piece")
 
 
@@ -76,6 +79,7 @@ class Outputs:
         self._rate_hz, self._full_scale_m_s, self._flac = rate_hz, full_scale_m_s, flac
         self._files: dict[Track, TrackFile] = {}
         self.cues: CueList | None = None
+        self._beside: list[Path] = []
         self._made: list[Path] = []
 
     def __enter__(self) -> Self:
@@ -119,6 +123,12 @@ class Outputs:
             self._files[track].write(channels(piece))
             yield piece
 
+    def beside(self, name: str) -> Path:
+        """Return where to write a file that is put in place with the sound; one of `BESIDE`."""
+        path = self.folder / name
+        self._beside.append(path)
+        return create_temporary(path)
+
     def complete(self) -> dict[str, Any]:
         """Finish all sound under temporary names; return what became of each file, for the report."""
         for file in self._files.values():
@@ -148,6 +158,8 @@ class Outputs:
                 file.commit()
             if self.cues is not None:
                 self.cues.commit()
+            for path in self._beside:
+                put_in_place(temporary_sibling(path), path)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -156,6 +168,8 @@ class Outputs:
             file.discard()
         if self.cues is not None:
             self.cues.discard()
+        for path in self._beside:
+            temporary_sibling(path).unlink(missing_ok=True)
         if kind is not None:
             self._remove_made()
 
@@ -169,6 +183,8 @@ class Outputs:
         if self.cues is None:
             for name in (CUES, LABELS):
                 (self.folder / name).unlink(missing_ok=True)
+        for name in BESIDE:
+            (self.folder / name).unlink(missing_ok=True)
 
     def _make_folder(self) -> None:
         self._made = [path for path in (self.folder, *self.folder.parents) if not path.exists()]

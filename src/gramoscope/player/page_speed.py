@@ -14,14 +14,23 @@ Report = Mapping[str, Any]
 
 def speed_section(report: Report) -> str:
     """Return the section of a report's speed, wow and hints."""
-    rows = [*_chosen(report["speed"]), *_places(report), *_hole(report["wow"]), *_hints(report["hints"])]
+    rows = [
+        *_chosen(report["speed"], report.get("scale")),
+        *_places(report),
+        *_hole(report["wow"]),
+        *_hints(report["hints"]),
+    ]
     return section("speed", "Speed and wow", facts(rows))
 
 
-def _chosen(speed: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+def _chosen(speed: Mapping[str, Any], scale: Mapping[str, Any] | None) -> Iterator[tuple[str, str]]:
+    guessed = scale is not None and any("turns at" in one for one in scale["assumed"])
     said = f"the capture says {speed['capture_rpm']:g}"
     if speed["chosen"] is None:
-        yield "playing speed", f"{speed_in_words(speed)}, as the capture says"
+        yield (
+            "playing speed",
+            f"{speed_in_words(speed)}, {'assumed: nobody knows' if guessed else 'as the capture says'}",
+        )
     else:
         origin = f" ({speed['origin']})" if speed["origin"] else ""
         yield "playing speed", f"{speed_in_words(speed)}, chosen as {speed['chosen']}{origin}; {said}"

@@ -9,8 +9,8 @@ import numpy as np
 
 from gramoscope.apparatus.capture import Capture
 from gramoscope.apparatus.inspection import frame_bytes
+from gramoscope.player.film import learned
 from gramoscope.player.pieces import read_group
-from gramoscope.player.play import learned
 from gramoscope.player.reading_store import LARGEST_PIECE, QUANTITIES, GroupReading
 from gramoscope.player.recipe import Recipe
 

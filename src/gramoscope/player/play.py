@@ -9,35 +9,35 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
-from gramoscope.apparatus.capture import Capture
+from gramoscope.apparatus.still import StillCapture
 from gramoscope.disc.characteristics import characteristic
 from gramoscope.disc.formats import direction_of_cut
 from gramoscope.errors import CaptureError, require
 from gramoscope.listening.broadcast_wave import FULL_SCALE_M_S
 from gramoscope.listening.flac import HIGHEST_RATE_HZ as HIGHEST_FLAC_RATE_HZ
-from gramoscope.pickup.cartridge import Pickup
 from gramoscope.pickup.device import Device
 from gramoscope.pickup.processor import PROCESSOR
 from gramoscope.player.catalogue import Catalogue, metadata_of
-from gramoscope.player.centring import surveyed
+from gramoscope.player.film import FilmReading
 from gramoscope.player.hints import Hints
+from gramoscope.player.kept_reading import Work
 from gramoscope.player.monitor import OVERVIEW_POINTS, Monitor
 from gramoscope.player.outputs import Outputs
 from gramoscope.player.picture import groove_picture, worst_places
-from gramoscope.player.provenance import InputHashes
 from gramoscope.player.quality_meter import QualityMeter
 from gramoscope.player.quality_page import quality_page
-from gramoscope.player.reading import Reading, Work, reading_of
+from gramoscope.player.reading import AnyCapture, Passage, Reading
 from gramoscope.player.recipe import Recipe
 from gramoscope.player.report import transfer_report
 from gramoscope.player.speed import Speed
+from gramoscope.player.stills import SILENCE_S, StillReading
 from gramoscope.player.tracks import (
     DIFFERENCE,
     EQUALISED,
@@ -52,11 +52,11 @@ from gramoscope.player.tracks import (
     tracks_of,
     vertical,
 )
-from gramoscope.player.workers import spreading
 from gramoscope.preamp.equalisation import Equaliser
+from gramoscope.preamp.in_a_row import in_a_row
 from gramoscope.preamp.resample import Resampler
 from gramoscope.preamp.walls import WallSplitter, in_direction
-from gramoscope.signal_path import Audio, WallTrace
+from gramoscope.signal_path import Audio, GrooveSound
 from gramoscope.tonearm.follow import Tonearm
 from gramoscope.turntable.hole_gauge import HoleGauge
 from gramoscope.turntable.rotation import Rotation
@@ -92,6 +92,8 @@ class Settings:
         How fast the record shall turn.
     device : Device
         On which groups are read; results agree to rounding.
+    groove : int or None
+        Of photographs, the only groove to be played, from 1; all of them when None.
     """
 
     rate_hz: float = 96_000.0
@@ -102,6 +104,7 @@ class Settings:
     catalogue: Catalogue = field(default_factory=Catalogue)
     speed: Speed = field(default_factory=Speed)
     device: Device = PROCESSOR
+    groove: int | None = None
 
     def __post_init__(self) -> None:
         possible = 1000 <= self.rate_hz <= 1_000_000 and self.rate_hz == round(self.rate_hz)
@@ -123,7 +126,7 @@ class Settings:
 
 
 def play(
-    capture: Capture,
+    capture: AnyCapture,
     recipe: Recipe,
     folder: Path,
     settings: Settings,
@@ -136,7 +139,7 @@ def play(
 
     Parameters
     ----------
-    capture : Capture
+    capture : Capture or StillCapture
     recipe : Recipe
     folder : Path
         Where the tracks (`player.tracks`), `report.json`, `report.html` and `groove.png` go.
@@ -146,7 +149,8 @@ def play(
     judge : callable, optional
         Given the report before anything is put in place; returns what to add to it, or raises (`player.again`).
     work : Work, optional
-        Who reads, and what becomes of what was read before (`player.reading`); the result does not depend on it.
+        Of a film: who reads, and what becomes of what was read before (`player.kept_reading`); the result does not depend on
+        it.
 
     Returns
     -------
@@ -158,105 +162,55 @@ def play(
     CaptureError
         If the groove was not seen anywhere.
     OutputError
-        If something cannot be written. Whatever is raised, no half-written file stays, but what was read is kept: the same
-        call goes on from there.
+        If something cannot be written. Whatever is raised, no half-written file stays, but what was read of a film is kept:
+        the same call goes on from there.
     """
     started = time.perf_counter()
     bench, direction = capture.bench, direction_of_cut(capture.bench.disc.cut)
-    rotation = settings.speed.rotation_of(bench.rotation)
     equaliser = Equaliser(characteristic(settings.characteristic_name))
-    tonearm = Tonearm(rotation, direction, bench.disc.wall_angle_rad, bench.passage_length_m, recipe.smoother)
-    resampler = Resampler(rotation, settings.rate_hz, recipe.passband)
-    hashes, monitor = InputHashes(), _monitor(capture, tonearm, resampler)
+    resampler = Resampler(settings.speed.rotation_of(bench.rotation), settings.rate_hz, recipe.passband)
 
     with (
         _outputs(capture, recipe, folder, settings) as files,
-        _reading(capture, recipe, folder, settings, work or Work(), progress) as reading,
+        _begun(capture, recipe, folder, settings, files, work or Work(), progress) as reading,
     ):
-        pickup = reading.pickup
-        centring = surveyed(capture, pickup, settings.workers, asked=settings.speed.remove_wow)
-        traces = _picked_up(reading, hashes, monitor, progress)
-        motion = monitor.followed(tonearm.follow(_spliced(centring.centred(traces), recipe, monitor)))
-        sound = files.kept(WALLS, resampler.resample(motion), WallSplitter(direction, pickup.walls).split)
+        tonearm = Tonearm(resampler.rotation, direction, bench.disc.wall_angle_rad, reading.length_m, recipe.smoother)
+        monitor = _monitor(capture, tonearm, resampler)
+
+        def played(passage: Passage) -> Iterator[GrooveSound]:
+            follower = replace(tonearm, passage_length_m=passage.length_m)
+            return resampler.resample(monitor.followed(follower.follow(passage.traces)))
+
+        silence = round(SILENCE_S * settings.rate_hz)
+        sound = in_a_row(map(played, reading.passages(monitor)), silence_samples=silence, told=reading.played)
+        sound = files.kept(WALLS, sound, WallSplitter(direction, reading.walls).split)
         sound = files.kept(VERTICAL, sound, vertical)
         flat = files.kept(FLAT, _heard((in_direction(piece, direction) for piece in sound), monitor), alone)
         for _ in files.kept(EQUALISED, equaliser.equalise(_repaired(flat, recipe, files, settings)), alone):
             pass
-        _require_sound(monitor)
+        _require_sound(capture, monitor)
         elapsed_s = time.perf_counter() - started
-        report = transfer_report(capture, recipe, pickup, settings, hashes, monitor, centring, files, folder, elapsed_s)
-        report["remarks"] += reading.remarks()
+        report = transfer_report(capture, recipe, reading, settings, monitor, files, folder, elapsed_s)
         report |= judge(report) if judge is not None else {}
-        picture = groove_picture(capture, pickup, monitor, rate_hz=settings.rate_hz, recipe_name=recipe.name)
-        files.finish(report, picture, quality_page(report, worst_places(capture, pickup, monitor)))
+        picture = groove_picture(capture, reading, monitor, rate_hz=settings.rate_hz, recipe_name=recipe.name)
+        files.finish(report, picture, quality_page(report, worst_places(capture, reading, monitor)))
     return report
 
 
-def learned(
-    capture: Capture,
+def _begun(
+    capture: AnyCapture,
     recipe: Recipe,
-    workers: int,
-    *,
-    device: Device = PROCESSOR,
-    progress: Progress | None = None,
-    groups: int | None = None,
-) -> Pickup:
-    """Return the recipe's cartridge, fitted to a capture, as it is after learning the passage.
-
-    Parameters
-    ----------
-    capture : Capture
-    recipe : Recipe
-    workers : int
-    device : Device
-        On which it will read.
-    progress : callable, optional
-        Told how much is done, of how much, and of what.
-    groups : int, optional
-        Learn from the first so many only.
-    """
-    with spreading(workers) as spread:
-        cartridge = recipe.cartridge_for(capture.bench, device)
-
-        def told(done: int, total: int) -> None:
-            if progress is not None:
-                progress(done, total, "Learning")
-
-        return cartridge.learn(capture.group, groups or capture.group_count, spread, told)
-
-
-def _reading(
-    capture: Capture, recipe: Recipe, folder: Path, settings: Settings, work: Work, progress: Progress | None
+    folder: Path,
+    settings: Settings,
+    files: Outputs,
+    work: Work,
+    progress: Progress | None,
 ) -> AbstractContextManager[Reading]:
-    workers, device = settings.workers, settings.device
-
-    def learn(noted: Capture) -> Pickup:
-        first = None
-        if work.following is not None:
-            first = work.following.learned_groups
-            work.following.wait(first)
-        return learned(noted, recipe, workers, device=device, progress=progress, groups=first)
-
-    return reading_of(capture, recipe, folder, device=device, workers=workers, work=work, learn=learn)
-
-
-def _picked_up(
-    reading: Reading, hashes: InputHashes, monitor: Monitor, progress: Progress | None
-) -> Iterator[WallTrace]:
-    """Read the stretches, several at a time."""
-    for group in reading.groups():
-        hashes.add({file.name: file.sha256 for file in group.files})
-        monitor.picked_up(group.trace, group.frames_lost)
-        reading.work.watched(monitor, group.trace)
-        if progress is not None:
-            progress(monitor.groups, reading.reader.store.group_count, "Playing")
-        yield group.trace
-
-
-def _spliced(traces: Iterator[WallTrace], recipe: Recipe, monitor: Monitor) -> Iterator[WallTrace]:
-    for trace, match in recipe.splice.join(traces):
-        monitor.spliced(match, trace)
-        yield trace
+    """Give a capture as it is after what must be known of the whole of it was found out."""
+    if isinstance(capture, StillCapture):
+        return nullcontext(StillReading.begun(capture, recipe, settings, files, progress))
+    require(settings.groove is None, f"groove {settings.groove} of a film", "photographs", "leave --groove out")
+    return FilmReading.begun(capture, recipe, folder, settings, work, progress)
 
 
 def _heard(pieces: Iterator[Audio], monitor: Monitor) -> Iterator[Audio]:
@@ -276,17 +230,17 @@ def _repaired(pieces: Iterator[Audio], recipe: Recipe, files: Outputs, settings:
         yield piece.sound
 
 
-def _outputs(capture: Capture, recipe: Recipe, folder: Path, settings: Settings) -> Outputs:
-    name = capture.folder.resolve().name
+def _outputs(capture: AnyCapture, recipe: Recipe, folder: Path, settings: Settings) -> Outputs:
     tracks = {
-        track: metadata_of(track, capture.bench, recipe, settings, capture_name=name) for track in tracks_of(recipe)
+        track: metadata_of(track, capture.bench, recipe, settings, capture_name=capture.name)
+        for track in tracks_of(recipe)
     }
     return Outputs(folder, tracks, rate_hz=settings.rate_hz, full_scale_m_s=settings.full_scale_m_s, flac=settings.flac)
 
 
-def _monitor(capture: Capture, tonearm: Tonearm, resampler: Resampler) -> Monitor:
+def _monitor(capture: AnyCapture, tonearm: Tonearm, resampler: Resampler) -> Monitor:
     bench, rotation, rate_hz = capture.bench, resampler.rotation, resampler.rate_hz
-    samples = float(rotation.time_of_arc_s(bench.passage_length_m)) * rate_hz
+    samples = float(rotation.time_of_arc_s(tonearm.passage_length_m)) * rate_hz
     quality = QualityMeter(tonearm, bench.disc.cut, rate_hz=rate_hz, passband=resampler.passband, samples=samples)
     monitor = Monitor(HoleGauge(bench.rotation), Hints(_steady_rpm(rotation), rate_hz), quality)
     monitor.overview.samples_per_point = max(1, int(np.ceil(samples / OVERVIEW_POINTS)))
@@ -297,12 +251,18 @@ def _steady_rpm(rotation: Rotation) -> float | None:
     return None if isinstance(rotation, DriftingRotation) else rotation.rpm
 
 
-def _require_sound(monitor: Monitor) -> None:
+def _require_sound(capture: AnyCapture, monitor: Monitor) -> None:
     if monitor.samples == 0 or monitor.interpolated == monitor.samples:
-        raise CaptureError(
-            f"the groove was not found in any of {monitor.groups} groups"
-            + (f"; the first problem: {monitor.problems[0]}" if monitor.problems else ""),
-            "sharp stripes along the groove where capture.toml says they are",
-            "look at the frames beside the rows that `gramoscope info` expects, and check [cover_glass], [disc] and rows; a "
-            "film of less than eight groups can only be played with --recipe seed-paper",
-        )
+        first = f"; the first problem: {monitor.problems[0]}" if monitor.problems else ""
+        needed, remedy = NEEDED[capture.layout == "stills"]
+        raise CaptureError(f"the groove was not found in any of {monitor.groups} groups{first}", needed, remedy)
+
+
+NEEDED = (
+    (
+        "sharp stripes along the groove where capture.toml says they are",
+        "look at the frames beside the rows that `gramoscope info` expects, and check [cover_glass], [disc] and rows; a "
+        "film of less than eight groups can only be played with --recipe seed-paper",
+    ),
+    ("edges of a groove that can be followed from side to side", "look at the picture, and check groove_along"),
+)

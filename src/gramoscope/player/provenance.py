@@ -13,12 +13,12 @@ from os.path import relpath
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
-from gramoscope.apparatus.capture import Capture
 from gramoscope.apparatus.fingerprint import sha256_of_file
 from gramoscope.player.recipe import Recipe, table_of_recipe
 
 if TYPE_CHECKING:
     from gramoscope.player.play import Settings
+    from gramoscope.player.reading import AnyCapture
 
 _LIBRARIES = ("gramoscope", "numpy", "scipy", "numba", "llvmlite", "soxr", "soundfile", "tifffile", "zarr", "pillow")
 _OPTIONAL = ("numba-cuda", "av")
@@ -44,15 +44,15 @@ def _versions_of_those_installed(names: tuple[str, ...]) -> dict[str, str]:
     return found
 
 
-def bench_of(capture: Capture) -> dict[str, Any]:
+def bench_of(capture: AnyCapture) -> dict[str, Any]:
     """Return the apparatus in plain numbers, SI units."""
-    bench = capture.bench
-    return {**asdict(bench), "focus_through_glass_m": bench.focus_through_glass_m, "stripe_rows": bench.stripe_rows()}
+    return capture.bench.as_dict()
 
 
 def settings_of(settings: Settings) -> dict[str, Any]:
     """Return what the listener chose beside recipe, catalogue and device, as far as the result depends on it."""
-    return {name: value for name, value in asdict(settings).items() if name not in _NOT_AMONG_SETTINGS}
+    left_out = {*_NOT_AMONG_SETTINGS, *([] if settings.groove is not None else ["groove"])}
+    return {name: value for name, value in asdict(settings).items() if name not in left_out}
 
 
 def from_folder(path: Path, folder: Path) -> str | None:
@@ -87,7 +87,7 @@ class InputHashes:
             self._lines.update(f"{digest}  {path}\n".encode())
             self.files += 1
 
-    def as_dict(self, capture: Capture) -> dict[str, Any]:
+    def as_dict(self, capture: AnyCapture) -> dict[str, Any]:
         """Return all sums, for the report."""
         return {
             "common_files": {_inside(capture, path): sha256_of_file(path) for path in capture.common_files()},
@@ -95,12 +95,12 @@ class InputHashes:
         }
 
 
-def hash_group(capture: Capture, number: int) -> dict[str, str]:
+def hash_group(capture: AnyCapture, number: int) -> dict[str, str]:
     """Return path → SHA-256 of the files that hold one group; an unreadable file has an empty sum."""
     return {_inside(capture, path): sha256_of_file(path) for path in capture.files_of_group(number)}
 
 
-def _inside(capture: Capture, path: Path) -> str:
+def _inside(capture: AnyCapture, path: Path) -> str:
     return path.relative_to(capture.folder).as_posix()
 
 

@@ -233,17 +233,19 @@ def _calibration(report: Report) -> str:
 
 def _worst(report: Report, places: Sequence[Place]) -> str:
     at_s = {group["group"]: group["at_s"] for group in report["quality"]["worst_groups"]}
+    stills = report["layout"] == "stills"
+    what, lines = ("Picture", "edges") if stills else ("Group", "stripes")
     drawn = [
         figure(
             png_of(place.figure),
-            alt=f"A frame of group {place.group.number} with the stripes that were found.",
-            caption=f"Group {place.group.number}, at {duration(at_s[place.group.number])}: "
+            alt=f"{what} {place.group.number} with the {lines} that were found.",
+            caption=f"{what} {place.group.number}, at {duration(at_s[place.group.number])}: "
             f"{percent(place.group.unread)} of the walls not read; places known to "
             f"{number(1e9 * place.group.sigma_m, 'nm')}. Dashed lines are filled in.",
         )
         for place in places
     ]
-    words = "The groups of which least was read, or, where all was read, with the largest claimed errors."
+    words = f"The {what.lower()}s of which least was read, or, where all was read, with the largest claimed errors."
     return section("worst", "The worst places", paragraph(words), figures(drawn))
 
 

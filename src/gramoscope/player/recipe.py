@@ -10,6 +10,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass, replace
 from difflib import get_close_matches
+from enum import Enum
 from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
@@ -17,9 +18,11 @@ from typing import Any, TypeVar, get_type_hints
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from gramoscope.apparatus.bench import Bench
+from gramoscope.apparatus.still import StillCapture
 from gramoscope.errors import ArgumentError, require
 from gramoscope.pickup.cartridge import Cartridge
 from gramoscope.pickup.device import Device
+from gramoscope.pickup.edges.edge_cartridge import EdgeCartridge
 from gramoscope.pickup.flow.flow_method import FlowMethod
 from gramoscope.pickup.flow.horn_schunck import GrooveHornSchunck, HornSchunck
 from gramoscope.pickup.flow.multigrid_horn_schunck import MultigridHornSchunck
@@ -33,9 +36,12 @@ from gramoscope.preamp.resample import DEFAULT_PASSBAND
 from gramoscope.preamp.rumble import RumbleFilter
 from gramoscope.tonearm.follow import KalmanSmoother, PlaceSmoother, Smoother
 from gramoscope.tonearm.splice import Splice
+from gramoscope.tonearm.stitch import Stitch
 
-DEFAULT_RECIPE = "best"
-_CARTRIDGES: dict[str, type[SeedPaperPickup] | type[TextureLikelihood]] = {
+DEFAULT_RECIPE, STILLS_RECIPE = "best", "stills"
+_EDGES = "edges"
+_CARTRIDGES: dict[str, type[SeedPaperPickup] | type[TextureLikelihood] | type[EdgeCartridge]] = {
+    _EDGES: EdgeCartridge,
     "seed-paper": SeedPaperPickup,
     "texture-likelihood": TextureLikelihood,
 }
@@ -46,6 +52,8 @@ _FLOWS: dict[str, type[FlowMethod]] = {
 }
 _SMOOTHERS: dict[str, type[KalmanSmoother] | type[PlaceSmoother]] = {"slopes": KalmanSmoother, "places": PlaceSmoother}
 _REPAIRS: dict[str, type[Any]] = {"declick": Declicker, "decrackle": Decrackler, "rumble": RumbleFilter}
+_JOINS = ("splice", "stitch")
+"""The table that says how a film, and how photographs, are joined."""
 # what a table that names none gets
 _CARTRIDGE, _FLOW, _SMOOTHER = "seed-paper", "groove-horn-schunck", "slopes"
 Part = TypeVar("Part")
@@ -59,10 +67,13 @@ class Recipe:
     ----------
     name, about : str
     cartridge : str
-        "seed-paper" or "texture-likelihood".
+        "seed-paper" or "texture-likelihood", which read films, or "edges", which reads photographs.
     pickup : dict
         Parameters of the cartridge, all but the bench.
     splice : Splice
+        Of the stretches of a film.
+    stitch : Stitch
+        Of neighbouring photographs.
     smoother : KalmanSmoother or PlaceSmoother
     passband : float
         Of the resampler.
@@ -75,6 +86,7 @@ class Recipe:
     cartridge: str = _CARTRIDGE
     pickup: Mapping[str, Any] = field(default_factory=dict)
     splice: Splice = field(default_factory=Splice)
+    stitch: Stitch = field(default_factory=Stitch)
     smoother: Smoother = field(default_factory=KalmanSmoother)
     passband: float = DEFAULT_PASSBAND
     repair: Repair = field(default_factory=Repair)
@@ -82,6 +94,12 @@ class Recipe:
     def cartridge_for(self, bench: Bench, device: Device = PROCESSOR) -> Cartridge:
         """Return the cartridge, fitted to an apparatus, reading on a device; ArgumentError if it has no kernels for it."""
         kind = _CARTRIDGES[self.cartridge]
+        if issubclass(kind, EdgeCartridge):
+            raise ArgumentError(
+                f"the recipe {self.name!r} for a film",
+                "a recipe for films",
+                f"--recipe {DEFAULT_RECIPE}, or leave --recipe out",
+            )
         if issubclass(kind, TextureLikelihood):
             return kind(bench, **self.pickup, device=device)
         require(
@@ -91,6 +109,21 @@ class Recipe:
             "--recipe best, or leave --device out",
         )
         return kind(bench, **self.pickup)
+
+    def edge_cartridge(self) -> EdgeCartridge:
+        """Return the cartridge for photographs; ArgumentError if the recipe reads films."""
+        require(
+            self.cartridge == _EDGES,
+            f"the recipe {self.name!r} for photographs",
+            "a recipe for photographs",
+            f"--recipe {STILLS_RECIPE}, or leave --recipe out",
+        )
+        return EdgeCartridge(**self.pickup)
+
+
+def recipe_for(capture: object) -> str:
+    """Return the name of the recipe that a capture is played with when nobody chooses one."""
+    return STILLS_RECIPE if isinstance(capture, StillCapture) else DEFAULT_RECIPE
 
 
 def shipped_recipes() -> tuple[str, ...]:
@@ -144,15 +177,17 @@ def recipe_of_table(table: Mapping[str, Any]) -> Recipe:
     """Return the recipe that a parsed TOML file describes; ArgumentError if a key is unknown or impossible."""
     _only(table, ("name", "about", "pickup", "tonearm", "preamp"), "the recipe")
     pickup, tonearm, preamp = (_table(table, key) for key in ("pickup", "tonearm", "preamp"))
-    _only(tonearm, ("splice", "smoother"), "[tonearm]")
-    _only(preamp, ("passband", *_REPAIRS), "[preamp]")
     name, parameters = _cartridge_of_table(pickup)
+    join = _JOINS[name == _EDGES]
+    _only(tonearm, (join, "smoother"), "[tonearm]")
+    _only(preamp, ("passband", *_REPAIRS), "[preamp]")
     return Recipe(
         name=_checked(str, table.get("name", "unnamed"), "name"),
         about=_checked(str, table.get("about", ""), "about"),
         cartridge=name,
         pickup=parameters,
         splice=build(Splice, _table(tonearm, "splice"), "[tonearm.splice]"),
+        stitch=build(Stitch, _table(tonearm, "stitch"), "[tonearm.stitch]"),
         smoother=_chosen(_SMOOTHERS, _SMOOTHER, _table(tonearm, "smoother"), "[tonearm.smoother]"),
         passband=_checked(float, preamp.get("passband", DEFAULT_PASSBAND), "[preamp] passband"),
         repair=Repair(
@@ -167,21 +202,28 @@ def recipe_of_table(table: Mapping[str, Any]) -> Recipe:
 
 def table_of_recipe(recipe: Recipe) -> dict[str, Any]:
     """Return a recipe with every one of its parameters, those it left out included; `recipe_of_table` reads it back."""
-    cartridge = recipe.cartridge_for(Bench())
+    stills = recipe.cartridge == _EDGES
+    cartridge = recipe.edge_cartridge() if stills else recipe.cartridge_for(Bench())
+    join = _JOINS[stills]
     pickup: dict[str, Any] = {}
     for parameter in _parameters(type(cartridge)):
         value = getattr(cartridge, parameter)
         if parameter == "flow":
             pickup[parameter] = _table_of_chosen(_FLOWS, value)
         else:
-            pickup[parameter] = asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
+            pickup[parameter] = asdict(value) if is_dataclass(value) and not isinstance(value, type) else _named(value)
     return {
         "name": recipe.name,
         "about": recipe.about,
         "pickup": {"cartridge": recipe.cartridge, **pickup},
-        "tonearm": {"splice": asdict(recipe.splice), "smoother": _table_of_chosen(_SMOOTHERS, recipe.smoother)},
+        "tonearm": {join: asdict(getattr(recipe, join)), "smoother": _table_of_chosen(_SMOOTHERS, recipe.smoother)},
         "preamp": {"passband": recipe.passband, **_table_of_repair(recipe.repair)},
     }
+
+
+def _named(value: Any) -> Any:
+    """A choice among a few by its name in TOML; anything else as it is."""
+    return value.name.lower().replace("_", "-") if isinstance(value, Enum) else value
 
 
 def _table_of_repair(repair: Repair) -> dict[str, Any]:
@@ -267,6 +309,8 @@ def build(kind: type[Part], table: Mapping[str, Any], where: str) -> Part:
 
 
 def _checked(hint: Any, value: Any, where: str) -> Any:
+    if isinstance(hint, type) and issubclass(hint, Enum):
+        return _member(hint, value, where)
     # TOML has no tuples, and pydantic's strictness (no "0.5" for 0.5, no true for 1) wants them
     given = tuple(value) if isinstance(value, list) else value
     try:
@@ -280,6 +324,13 @@ def _checked(hint: Any, value: Any, where: str) -> Any:
     ]
     require(all(number >= 0 for number in numbers), f"{where} = {value!r}", "zero or more")
     return checked
+
+
+def _member(choices: type[Enum], name: Any, where: str) -> Enum:
+    named = {_named(choice): choice for choice in choices}
+    if not isinstance(name, str) or name not in named:
+        raise ArgumentError(f"{where} = {name!r}", f"one of {', '.join(named)}")
+    return named[name]
 
 
 _IN_WORDS: dict[Any, str] = {

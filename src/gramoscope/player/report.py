@@ -7,16 +7,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gramoscope.apparatus.capture import Capture
 from gramoscope.disc.characteristics import FLAT as FLAT_CHARACTERISTIC
 from gramoscope.disc.characteristics import characteristic
 from gramoscope.disc.formats import direction_of_cut
-from gramoscope.pickup.cartridge import Pickup
 from gramoscope.player.calibration_check import calibration_check
-from gramoscope.player.centring import Centring
 from gramoscope.player.monitor import Monitor
 from gramoscope.player.provenance import (
-    InputHashes,
     bench_of,
     command_line,
     from_folder,
@@ -24,6 +20,7 @@ from gramoscope.player.provenance import (
     settings_of,
     versions,
 )
+from gramoscope.player.reading import AnyCapture, Reading
 from gramoscope.player.recipe import Recipe
 from gramoscope.player.response import response_of
 from gramoscope.player.tracks import EQUALISED, FLAT, REPAIRED
@@ -38,19 +35,21 @@ REPORT_FORMAT = "gramoscope-report/1"
 
 
 def transfer_report(
-    capture: Capture,
+    capture: AnyCapture,
     recipe: Recipe,
-    pickup: Pickup,
+    reading: Reading,
     settings: Settings,
-    hashes: InputHashes,
     monitor: Monitor,
-    centring: Centring,
     outputs: Outputs,
     folder: Path,
     elapsed_s: float,
 ) -> dict[str, Any]:
     """Return the report of a transfer into a folder as numbers, texts, arrays, lists and dicts; docs/reference/report.md."""
-    seconds, files, seen = monitor.samples / settings.rate_hz, outputs.complete(), monitor.as_dict()
+    seconds, files, seen = (
+        (monitor.samples + monitor.silence_samples) / settings.rate_hz,
+        outputs.complete(),
+        monitor.as_dict(),
+    )
     repair = None if outputs.cues is None else outputs.cues.as_dict(recipe.repair)
     curve = characteristic(settings.characteristic_name).name
     equalised = {"characteristic": curve, "made_of": (FLAT if repair is None else REPAIRED).name}
@@ -62,21 +61,27 @@ def transfer_report(
         "catalogue": {name: text for name, text in asdict(settings.catalogue).items() if name != "made"},
         "command": command_line(),
         "settings": settings_of(settings),
-        "capture": str(capture.folder.resolve()),
-        "capture_name": capture.folder.resolve().name,
-        "capture_from_here": from_folder(capture.folder, folder),
+        "capture": str(capture.path.resolve()),
+        "capture_name": capture.name,
+        "capture_from_here": from_folder(capture.path, folder),
         "layout": capture.layout,
         "seconds": seconds,
         "rate_hz": settings.rate_hz,
         "speed": settings.speed.as_dict(capture.bench.rotation),
-        "wow": centring.as_dict(hole),
+        "wow": reading.centring.as_dict(hole),
         "hints": monitor.hints.as_dict() if monitor.hints else {},
         "direction": direction_of_cut(capture.bench.disc.cut),
-        "walls_read": list(pickup.walls),
-        "remarks": [*_remarks(capture, pickup.walls), *centring.remarks(hole), *_clipped(files)],
-        "calibration": dict(pickup.calibration),
-        "calibration_check": calibration_check(capture.bench, pickup.calibration, seen),
+        "walls_read": list(reading.walls),
+        "remarks": [
+            *reading.remarks(),
+            *_remarks(capture, reading.walls),
+            *reading.centring.remarks(hole),
+            *_clipped(files),
+        ],
+        "calibration": dict(reading.calibration),
+        "calibration_check": calibration_check(capture.bench, reading.calibration, seen),
         **seen,
+        **reading.as_dict(),
         "response": response_of(settings.characteristic_name, rate_hz=settings.rate_hz),
         "files": {
             **{name: {**file, "characteristic": FLAT_CHARACTERISTIC.name} for name, file in files.items()},
@@ -88,14 +93,14 @@ def transfer_report(
         "recipe": recipe_of(recipe),
         "device": settings.device.name,
         "bench": bench_of(capture),
-        "inputs": hashes.as_dict(capture),
+        "inputs": reading.hashes.as_dict(capture),
         "versions": versions(),
         "elapsed_s": elapsed_s,
         "real_time_factor": seconds / elapsed_s,
     }
 
 
-def _remarks(capture: Capture, walls: tuple[str, ...]) -> tuple[str, ...]:
+def _remarks(capture: AnyCapture, walls: tuple[str, ...]) -> tuple[str, ...]:
     """What a listener should know before judging."""
     disc = capture.bench.disc
     if len(walls) == 2:

@@ -113,8 +113,8 @@ def learn(
     Returns
     -------
     GroovePrior
-        By bounded Nelder–Mead over the logarithms of all five; `before`, or the middle of the limits, when there
-        are no lessons.
+        By bounded Nelder–Mead over the logarithms of all five, begun twice where nothing was believed so far; `before`,
+        or the middle of the limits, when there are no lessons.
     """
     if given is None:
         return before or limits.middle
@@ -137,7 +137,11 @@ def learn(
     # what was learned in silence can be so far off that nothing leads away from it
     if before and cost(known) <= cost(first):
         first, step = known, 0.4 * step
-    return _prior(_least(cost, first, step, limits.logarithms, 100 if before else 250), limits)
+    found = _least(cost, first, step, limits.logarithms, 100 if before else 250)
+    if before is None:
+        # a flat valley is taken for its bottom; looked at afresh it leads on, and what is wide is known better by two units
+        found = _least(cost, found, 0.25 * step, limits.logarithms, 250)
+    return _prior(found, limits)
 
 
 def _louder(given: Lessons, sigma: FloatArray) -> float:

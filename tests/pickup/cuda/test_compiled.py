@@ -28,7 +28,7 @@ def _signatures() -> list[tuple[Any, tuple[Any, ...]]]:
     places, mask = of(whole, 2), of(byte, 2)
     return [
         *((film.pair_shifts, (one, of(level, 1), of(whole, 1), level, whole, of(level, 1))) for one in pictures),
-        *((film.cell_energy, (one, of(whole, 1), line, plane)) for one in pictures),
+        *((film.cell_energy, (one, of(whole, 1), of(whole, 1), line, plane)) for one in pictures),
         *((film.overlay_tiles, (one, places, plane, line, mask, plane)) for one in pictures),
         (film.hold_ends, (plane, whole, whole)),
         (film.any_brighter, (plane, real, of(types.int32, 1))),

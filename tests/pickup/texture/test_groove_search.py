@@ -11,7 +11,7 @@ from gramoscope.disc.formats import Cut
 from gramoscope.errors import ArgumentError
 from gramoscope.pickup.texture.groove_search import GrooveSearch, best_path
 from gramoscope.pickup.texture.layout import StripeLayout
-from gramoscope.pickup.texture.sharpness import CELL_PX, cell_energy, ridges, sharpness
+from gramoscope.pickup.texture.sharpness import CELL_PX, cell_energy, ridges, sharpness, whole_pixels
 from gramoscope.simulation.scene import filming_bench
 
 CELLS, HEIGHT = 160, 640
@@ -214,10 +214,20 @@ def test_the_energy_of_a_cell_is_that_of_the_frames_laid_over_each_other(dtype: 
     expected = square[:, :72].reshape(4, 9, CELL_PX).sum(axis=2).T
     energy = np.empty((9, 4), np.float32)
     total_room = np.empty(77, np.uint16 if dtype is np.uint8 else np.uint32)
-    cell_energy(images, np.array([0, 3, 7]), (1 / count).astype(np.float32), total_room, energy)
+    cell_energy(images, np.arange(3), np.array([0, 3, 7]), (1 / count).astype(np.float32), total_room, energy)
     np.testing.assert_allclose(energy, expected, rtol=1e-4)
     # uneven shifts count to whole pixels, and the last frame ends where the picture does
     assert sharpness(images, shift).shape == (9, 4)
+
+
+@pytest.mark.parametrize(("frames", "seen"), [(1, [0]), (4, [0, 1, 2, 3]), (12, [0, 2, 4, 7, 9, 11])])
+def test_some_frames_show_where_it_is_sharp_from_the_first_to_the_last(frames: int, seen: list[int]) -> None:
+    shift = 2.4 * np.arange(frames)
+    some, offset, share = whole_pixels(50, shift)
+    assert some.tolist() == seen
+    assert offset.tolist() == np.minimum(np.rint(shift), share.size - 50)[seen].tolist()
+    count = sum((np.arange(share.size) >= first) & (np.arange(share.size) < first + 50) for first in offset)
+    np.testing.assert_allclose(share, 1 / count, rtol=1e-6)
 
 
 def test_a_ridge_stands_over_its_flanks_and_a_plain_is_none() -> None:

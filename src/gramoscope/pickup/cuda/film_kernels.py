@@ -90,27 +90,27 @@ def pair_shifts(film, expected_px, rows, reach_px, rounds, found_px):  # type: i
 
 
 @cuda.jit(device=True)
-def _mean_of_column(film, offset, share, row, x):  # type: ignore[no-untyped-def]
-    """The mean of whole pixels in one column of the overlay; 0 beyond it."""
+def _mean_of_column(film, frames, offset, share, row, x):  # type: ignore[no-untyped-def]
+    """The mean of whole pixels of some frames in one column of the overlay; 0 beyond it."""
     if x < 0 or x >= share.size:
         return float32(0)
     total = 0
-    for k in range(film.shape[0]):
+    for k in range(frames.size):
         column = x - offset[k]
         if column >= 0 and column < film.shape[2]:
-            total += int(film[k, row, column])
+            total += int(film[frames[k], row, column])
     return float32(total) * share[x]
 
 
 @cuda.jit
-def cell_energy(film, offset, share, energy):  # type: ignore[no-untyped-def]
+def cell_energy(film, frames, offset, share, energy):  # type: ignore[no-untyped-def]
     """Write energies, [cell, row]; see `texture.sharpness.cell_energy`."""
     mean = cuda.shared.array(ENERGY_ROOM, float32)
     square = cuda.shared.array(ENERGY_COLUMNS, float32)
     thread, row = cuda.threadIdx.x, cuda.blockIdx.y
     first = cuda.blockIdx.x * ENERGY_COLUMNS
     for i in range(thread, ENERGY_ROOM, ENERGY_COLUMNS):
-        mean[i] = _mean_of_column(film, offset, share, row, first + i - BESIDE)
+        mean[i] = _mean_of_column(film, frames, offset, share, row, first + i - BESIDE)
     cuda.syncthreads()
     x, i = first + thread, thread + BESIDE
     difference = mean[i + 1] - mean[i - 1] + float32(0.5) * (mean[i + 2] - mean[i - 2])

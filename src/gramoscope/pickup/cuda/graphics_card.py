@@ -72,11 +72,11 @@ class GraphicsCard:
     def sharpness(self, film: Film, shift_px: FloatArray) -> Float32Array:
         """See `texture.sharpness`; energies come back, and what follows is small."""
         _, height, width = film.images.shape
-        offset, share = whole_pixels(width, shift_px)
+        frames, offset, share = whole_pixels(width, shift_px)
         energy = cuda.device_array((share.size // CELL_PX, height), np.float32)
         blocks = (-(-share.size // film_kernels.ENERGY_COLUMNS), height)
         kernel = film_kernels.cell_energy[blocks, film_kernels.ENERGY_COLUMNS]
-        kernel(film.images, cuda.to_device(offset), cuda.to_device(share), energy)
+        kernel(film.images, *(cuda.to_device(one) for one in (frames, offset, share)), energy)
         return sharpness_of(energy.copy_to_host())
 
     def overlay(

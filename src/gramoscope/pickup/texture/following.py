@@ -14,6 +14,7 @@ import numba
 import numpy as np
 
 from gramoscope.conventions import Float32Array, FloatArray, IntArray
+from gramoscope.pickup.texture.vector_lanes import LANES, interpolate
 
 TAPS = 10
 PHASES = 512
@@ -44,8 +45,6 @@ def interpolation_taps(fraction: FloatArray) -> Float32Array:
 TAPS_OF_PHASES = interpolation_taps(np.arange(PHASES + 1) / PHASES)
 REACH = 8
 """Rows beyond a window on each side that its derivatives, and windows a little to the side of it, need."""
-LANES = 16
-"""Windows are laid out in memory so many rows at a time."""
 GENTLE = np.array([45.0, -9.0, 1.0]) / 60
 """Weights of x₁ − x₋₁, x₂ − x₋₂, x₃ − x₋₃ in a derivative that is exact up to the sixth degree and fades beyond a third of a
 cycle a row: it forgives rows that are too far apart for what they show."""
@@ -127,7 +126,7 @@ def _followed(columns: Float32Array, path_row: FloatArray, half_px: int) -> Floa
 
 
 def padded_rows(rows: int) -> int:
-    """Return how many rows a window is given in memory."""
+    """Return how many rows a window is given in memory: sixteens."""
     return -(-rows // LANES) * LANES
 
 
@@ -185,32 +184,23 @@ def places_of(path_row: FloatArray, half: int) -> tuple[IntArray, IntArray]:
 
 @numba.njit(cache=True, nogil=True)
 def follow_rows(columns, path_row, taps, half, window):  # type: ignore[no-untyped-def]
-    """Write a window that begins `half` rows before the path, by the taps of evenly spaced phases from 0 to 1."""
+    """Write a window, its rows in sixteens, that begins `half` rows before the path, by taps of phases from 0 to 1."""
     width, rows = window.shape
-    height = columns.shape[1]
-    reach = rows + taps.shape[1] - 1
+    height, count = columns.shape[1], taps.shape[1]
+    reach = rows + count - 1
     edge = np.empty(reach, np.float32)
-    picture = columns.reshape(columns.size)
+    picture, tap, into = columns.reshape(columns.size), taps.reshape(taps.size), window.reshape(window.size)
     for x in range(width):
         floor = int(np.floor(path_row[x]))
         phase = int((path_row[x] - floor) * (taps.shape[0] - 1) + 0.5)
-        first = floor - half - (taps.shape[1] // 2 - 1)
+        first = floor - half - (count // 2 - 1)
         if first >= 0 and first + reach <= height:
-            _interpolate(picture, np.uint64(x * height + first), taps[phase], window[x])
+            interpolate(picture, x * height + first, SOON * height, tap, phase * count, into, x * rows, rows)
         else:
             for j in range(reach):
                 edge[j] = columns[x, min(max(first + j, 0), height - 1)]
-            _interpolate(edge, np.uint64(0), taps[phase], window[x])
+            interpolate(edge, 0, 0, tap, phase * count, into, x * rows, rows)
 
 
-@numba.njit(cache=True, nogil=True, fastmath={"contract"})
-def _interpolate(picture, first, w, value):  # type: ignore[no-untyped-def]
-    """Ten taps at once, so that every value is written once; unsigned places, for signed ones may count from the end."""
-    w0, w1, w2, w3, w4, w5, w6, w7, w8, w9 = w[0], w[1], w[2], w[3], w[4], w[5], w[6], w[7], w[8], w[9]
-    x0, x1, x2, x3, x4 = first, first + np.uint64(1), first + np.uint64(2), first + np.uint64(3), first + np.uint64(4)
-    x5, x6, x7 = first + np.uint64(5), first + np.uint64(6), first + np.uint64(7)
-    x8, x9 = first + np.uint64(8), first + np.uint64(9)
-    for j in range(np.uint64(value.size)):
-        near = (w3 * picture[x3 + j] + w4 * picture[x4 + j]) + (w5 * picture[x5 + j] + w6 * picture[x6 + j])
-        far = (w0 * picture[x0 + j] + w1 * picture[x1 + j]) + (w2 * picture[x2 + j] + w7 * picture[x7 + j])
-        value[j] = near + far + (w8 * picture[x8 + j] + w9 * picture[x9 + j])
+SOON = 8
+"""So many columns ahead the picture is called for; it is larger than the cache, and a path that rises is not foreseen by it."""

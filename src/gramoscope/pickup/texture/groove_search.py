@@ -205,7 +205,7 @@ class GrooveSearch:
         large = [self.usual_swing_px if use else self.usual_drift_px for use in used]
         usual = (lateral / large[0]) ** 2 + (vertical[:, None] / large[1]) ** 2
         score = np.empty((len(ridge), *usual.shape), np.float32)
-        score[:] = -self.swing_cost * usual
+        score[:] = (-self.swing_cost * usual).astype(np.float32)  # once, not for every cell
         signs = wall_sign(layout.wall).astype(np.int64)
         stripes = zip(layout.rest_row, signs, layout.first_row, layout.last_row, layout.from_bottom_px, strict=True)
         for rest, sign, low, high, from_bottom in stripes:

@@ -16,7 +16,7 @@ from scipy import fft
 
 from gramoscope.conventions import BoolArray, Float32Array, FloatArray, IntArray
 from gramoscope.pickup.texture.filter_bank import energies, let_through
-from gramoscope.pickup.texture.following import BLOCK, REACH, TAPS_OF_PHASES, follow_rows, padded_rows, wide_rows
+from gramoscope.pickup.texture.following import REACH, TAPS_OF_PHASES, follow_rows, padded_rows, wide_rows
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.likelihood import (
     LOUDNESS_BELL,
@@ -28,7 +28,9 @@ from gramoscope.pickup.texture.likelihood import (
     temper,
     within,
 )
-from gramoscope.pickup.texture.spectrum import Band, filter_columns, half_of
+from gramoscope.pickup.texture.spectrum import Band, half_of
+from gramoscope.pickup.texture.vector_lanes import AT_ONCE, LANES, filter_symmetrically, mix
+from gramoscope.pickup.texture.vector_lanes import power as usual_power
 
 if TYPE_CHECKING:
     from gramoscope.pickup.texture.stretch import Stretch
@@ -159,52 +161,60 @@ def _clear(usable, burnt, support, rows, half_px, least_support, burnt_share, cl
             clear[i, x] &= spoilt[x] <= burnt_share * (2 * half_px + 1)
 
 
-@numba.njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
-def _square(values):  # type: ignore[no-untyped-def]
-    total = np.float32(0)
-    for c in range(values.size):
-        total += values[c] * values[c]
-    return total
-
-
 @numba.njit(cache=True, nogil=True)
-def _scaled(values, share, out):  # type: ignore[no-untyped-def]
-    for c in range(out.size):
-        out[c] = values[c] * share
+def _whiten(window, basis, half_taps, usual, white, power):  # type: ignore[no-untyped-def]
+    """Write whitened channels of a window and how much of the usual texture they show; columns in fours, channels sixteen.
+
+    The window's last columns are black where they are not in the picture, of `power.size` columns.
+    """
+    width, rows, reach = power.size, window.shape[1], half_taps.size - 1
+    wide = np.empty((len(white) + 2 * reach, LANES), np.float32)
+    lines = wide.reshape(wide.size)
+    seen, weights, form = window.reshape(window.size), basis.reshape(basis.size), usual.reshape(usual.size)
+    out, powers = white.reshape(white.size), np.empty(len(white), np.float32)
+    for x in range(0, len(white), AT_ONCE):
+        mix(seen, x * rows, rows, weights, 0, lines, (reach + x) * LANES)
+    wide[reach + len(white) :] = np.float32(0)
+    for k in range(reach):
+        # a window that is shorter than the mirror repeats its other end
+        mirrored = min(k, width - 1)
+        for c in range(LANES):
+            wide[reach - 1 - k, c] = wide[reach + mirrored, c]
+            wide[reach + width + k, c] = wide[reach + width - 1 - mirrored, c]
+    for x in range(0, len(white), AT_ONCE):
+        filter_symmetrically(lines, (reach + x) * LANES, half_taps, reach, out, x * LANES)
+        usual_power(out, x * LANES, form, 0, powers, x)
+    power[:] = powers[:width]
 
 
 @numba.njit(cache=True, nogil=True)
 def _draw(columns, rows, clear, half_px, half_taps, basis, usual, limits, drawn, weight):  # type: ignore[no-untyped-def]
     """Write the whitened channels of each stripe, times their weight, and the weight."""
-    stripes, _, channels = drawn.shape
     width = columns.shape[0]
-    blocks = -(-width // BLOCK)
-    window = np.empty((blocks * BLOCK, basis.shape[1]), np.float32)
+    padded = -(-width // AT_ONCE) * AT_ONCE
+    window, white = np.empty((padded, basis.shape[1]), np.float32), np.empty((padded, LANES), np.float32)
     window[width:] = np.float32(0)
-    raw = np.empty((blocks * BLOCK, channels), np.float32)
-    white, power = np.empty((width, channels), np.float32), np.empty(width, np.float32)
-    seen, valid = np.empty((BLOCK, channels), np.float32), np.empty(width, np.bool_)
-    for i in range(stripes):
+    power, valid = np.empty(width, np.float32), np.empty(width, np.bool_)
+    for i in range(len(drawn)):
         drawn[i, width:] = np.float32(0)
         if not clear[i].any():
             drawn[i], weight[i] = np.float32(0), np.float32(0)
             continue
         follow_rows(columns, rows[i], TAPS_OF_PHASES, half_px + REACH, window[:width])
-        # in small blocks, which no library spreads over threads of its own
-        for k in range(blocks):
-            part = slice(k * BLOCK, (k + 1) * BLOCK)
-            np.dot(window[part], basis[i], raw[part])
-        filter_columns(raw[:width], half_taps, white)
-        for k in range(blocks):
-            first, stop = k * BLOCK, min((k + 1) * BLOCK, width)
-            np.dot(white[first:stop], usual[i], seen[: stop - first])
-            for x in range(first, stop):
-                power[x] = _square(seen[x - first])
+        _whiten(window, basis[i], half_taps, usual[i], white, power)
         within(power, TEXTURE_PX // 2, limits[0], limits[1], valid)
         valid &= clear[i]
         soften(valid, TAPER, weight[i])
         for x in range(width):
-            _scaled(white[x], weight[i, x], drawn[i, x])
+            share = weight[i, x]
+            for c in range(LANES):
+                drawn[i, x, c] = white[x, c] * share
+
+
+def _in_lanes(weights: Float32Array, axes: tuple[int, ...]) -> Float32Array:
+    """Return weights with sixteen channels along some axes; those that there are not have none."""
+    missing = [(0, LANES - size if axis in axes else 0) for axis, size in enumerate(weights.shape)]
+    return np.pad(weights, missing) if any(more for _, more in missing) else weights
 
 
 @numba.njit(cache=True, nogil=True)
@@ -251,9 +261,10 @@ def heard(
     weight : float32 array, shape (stripe, column)
         0 … 1.
     """
-    drawn = np.empty((len(rows), ear.length, ear.basis.shape[2]), np.float32)
+    drawn = np.empty((len(rows), ear.length, LANES), np.float32)
     weight, said = np.empty(rows.shape, np.float32), np.empty(rows.shape)
-    _draw(columns, rows, clear, ear.half_px, ear.half_taps, ear.basis, ear.usual, power_limits, drawn, weight)
+    basis, usual = _in_lanes(ear.basis, (2,)), _in_lanes(ear.usual, (1, 2))
+    _draw(columns, rows, clear, ear.half_px, ear.half_taps, basis, usual, power_limits, drawn, weight)
     spectrum = fft.rfft(drawn, axis=1)
     through = np.zeros((len(rows), ear.sign.shape[1], spectrum.shape[1]), np.complex64)
     let_through(spectrum, ear.filters, ear.band.bins(ear.length).start, through)

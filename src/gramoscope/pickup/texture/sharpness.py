@@ -12,18 +12,25 @@ import numba
 import numpy as np
 
 from gramoscope.conventions import Float32Array, FloatArray, IntArray
-from gramoscope.pickup.overlay import overlay_width
+from gramoscope.pickup.overlay import overlay_width, sum_type
 from gramoscope.signal_path import ImageArray
 
 CELL_PX = 8
-"""Columns in a cell; `_sum_of_eight` adds so many."""
+"""Columns in a cell; `_sums_of_eight` adds so many."""
+ROWS = 16
+"""So many rows are looked at before their energies are written."""
 CEILING = 1.5
+SOME_FRAMES = 6
+"""So many frames at most, the first and the last among them, show where the picture is sharp: most of what is uncertain is the
+texture, the same in all."""
 
 
 @numba.njit(cache=True, nogil=True)
-def _add_pixels(pixels, total):  # type: ignore[no-untyped-def]
-    for x in range(pixels.size):
-        total[x] += pixels[x]
+def _add_pixels(film, first, total, begin, count):  # type: ignore[no-untyped-def]
+    """Add pixels of a film as one line; unsigned places, for signed ones may count from the end."""
+    here, there = np.uint64(first), np.uint64(begin)
+    for x in range(np.uint64(count)):
+        total[there + x] += film[here + x]
 
 
 @numba.njit(cache=True, nogil=True)
@@ -42,24 +49,36 @@ def _scale(total, share, mean):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _sum_of_eight(values, cell):  # type: ignore[no-untyped-def]
-    v = values[cell * CELL_PX : (cell + 1) * CELL_PX]
-    return ((v[0] + v[4]) + (v[1] + v[5])) + ((v[2] + v[6]) + (v[3] + v[7]))
+def _sums_of_eight(v, sums):  # type: ignore[no-untyped-def]
+    one, two, three, four = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(4)
+    for cell in range(np.uint64(sums.size)):
+        a = cell * np.uint64(CELL_PX)
+        b = a + four
+        sums[cell] = ((v[a] + v[b]) + (v[a + one] + v[b + one])) + (
+            (v[a + two] + v[b + two]) + (v[a + three] + v[b + three])
+        )
 
 
 @numba.njit(cache=True, nogil=True)
-def cell_energy(images, offset, share, total, energy):  # type: ignore[no-untyped-def]
-    """Write the energy of each cell of the mean of frames laid over each other by whole pixels; `total` has room for sums."""
-    frames, height, width = images.shape
+def cell_energy(images, frames, offset, share, total, energy):  # type: ignore[no-untyped-def]
+    """Write the energy of each cell of the mean of some frames, laid over each other by whole pixels, added up in `total`."""
+    _, height, width = images.shape
+    film = images.reshape(images.size)
     mean, square = np.empty(total.size, np.float32), np.zeros(total.size, np.float32)
-    for row in range(height):
-        total[:] = 0
-        for k in range(frames):
-            _add_pixels(images[k, row], total[offset[k] : offset[k] + width])
-        _scale(total, share, mean)
-        _squares(mean[1:-5], mean[2:-4], mean[4:-2], mean[5:-1], square[3:-3])
-        for cell in range(energy.shape[0]):
-            energy[cell, row] = _sum_of_eight(square, cell)
+    # a column of cells is written a cache line at a time
+    part = np.empty((ROWS, len(energy)), np.float32)
+    for first in range(0, height, ROWS):
+        stop = min(first + ROWS, height)
+        for row in range(first, stop):
+            total[:] = 0
+            for k in range(frames.size):
+                _add_pixels(film, (frames[k] * height + row) * width, total, offset[k], width)
+            _scale(total, share, mean)
+            _squares(mean[1:-5], mean[2:-4], mean[4:-2], mean[5:-1], square[3:-3])
+            _sums_of_eight(square, part[row - first])
+        for cell in range(len(energy)):
+            for j in range(stop - first):
+                energy[cell, first + j] = part[j, cell]
 
 
 def sharpness(images: ImageArray, shift_px: FloatArray, *, ceiling: float = CEILING) -> Float32Array:
@@ -78,23 +97,22 @@ def sharpness(images: ImageArray, shift_px: FloatArray, *, ceiling: float = CEIL
     float32 array, shape (cell, row)
         Root of the energy above the noise, a little smoothed, in units of the sharpest row of a typical cell.
     """
-    offset, share = whole_pixels(images.shape[2], shift_px)
+    frames, offset, share = whole_pixels(images.shape[2], shift_px)
     width = share.size
     energy = np.empty((width // CELL_PX, images.shape[1]), np.float32)
-    small = images.dtype == np.uint8 and len(images) <= np.iinfo(np.uint16).max // np.iinfo(np.uint8).max
-    total = np.empty(width, np.uint16 if small else np.uint32)
-    cell_energy(images, offset, share, total, energy)
+    cell_energy(np.ascontiguousarray(images), frames, offset, share, np.empty(width, sum_type(images)), energy)
     return sharpness_of(energy, ceiling=ceiling)
 
 
-def whole_pixels(frame_width: int, shift_px: FloatArray) -> tuple[IntArray, Float32Array]:
-    """Return where the frames begin, laid over each other by whole pixels, and one over how many lie in each column."""
+def whole_pixels(frame_width: int, shift_px: FloatArray) -> tuple[IntArray, IntArray, Float32Array]:
+    """Return which frames are looked at, where each begins, by whole pixels, and one over how many lie in each column."""
     width = overlay_width(frame_width, shift_px)
-    offset = np.minimum(np.rint(shift_px).astype(np.int64), width - frame_width)
+    frames = np.unique(np.rint(np.linspace(0, shift_px.size - 1, min(SOME_FRAMES, shift_px.size))).astype(np.int64))
+    offset = np.minimum(np.rint(shift_px).astype(np.int64), width - frame_width)[frames]
     counts = np.zeros(width)
     for first in offset:
         counts[first : first + frame_width] += 1
-    return offset, (1 / np.maximum(counts, 1)).astype(np.float32)
+    return frames, offset, (1 / np.maximum(counts, 1)).astype(np.float32)
 
 
 def sharpness_of(energy: Float32Array, *, ceiling: float = CEILING) -> Float32Array:
@@ -102,7 +120,8 @@ def sharpness_of(energy: Float32Array, *, ceiling: float = CEILING) -> Float32Ar
     sharp = np.empty_like(energy)
     _smooth(energy, sharp)
     # a row is quiet all along the stretch, or it is not
-    noise = np.float32(np.quantile(np.median(sharp[::EVERY], axis=0), 0.1))
+    some = np.sort(sharp[::EVERY], axis=0)
+    noise = np.float32(np.quantile(0.5 * (some[(len(some) - 1) // 2] + some[len(some) // 2]), 0.1))
     peak = np.empty(len(sharp), np.float32)
     _amplitudes(sharp, noise, peak)
     reference = np.float32(np.median(peak))

@@ -38,6 +38,7 @@ from gramoscope.pickup.texture.likelihood import (
 from gramoscope.pickup.texture.reading import Model, Rules
 from gramoscope.pickup.texture.spectrum import CrossSpectra, cross_spectra, precision
 from gramoscope.pickup.texture.stretch import Stretch
+from gramoscope.pickup.texture.vector_lanes import LANES
 
 LEAST_WEIGHT = 100.0
 """Columns of a stretch; with fewer it teaches nothing."""
@@ -209,6 +210,7 @@ class StripeLearning:
     filters: int = 4
 
     def __post_init__(self) -> None:
+        require(self.channels <= LANES, f"{self.channels} channels", f"at most {LANES}, which are heard at once")
         require(
             1 <= self.patterns < self.channels,
             f"{self.patterns} of {self.channels} channels for the usual texture",

@@ -1,0 +1,218 @@
+"""The place of an edge in every column, from its coarse course, by the profile that it shows.
+
+Round by round, the profile is learned along the course; every column says how far off the course its own pixels put the
+edge (`column_places`: one step, linear in the pixels, so that errors are those of the pixels and not of a search); and the
+smoothest course that these places allow is laid through them (`steady_course`). When the course has settled, a place is the
+course plus what its own column says: a measurement of that column, not drawn towards its neighbours.
+
+A column that has lost most of what it could tell to dust, or disagrees with its surroundings, is not measured: the smooth
+course stands in for it, with the error of a bridge.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gramoscope.conventions import BoolArray, FloatArray
+from gramoscope.errors import require
+from gramoscope.pickup.edges.column_places import ColumnPlaces, column_places
+from gramoscope.pickup.edges.edge_band import EdgeBand, edge_band
+from gramoscope.pickup.edges.edge_profile import EdgeProfile, learn_profile
+from gramoscope.pickup.edges.pooling import Pooled, pool_columns, pooled
+from gramoscope.pickup.edges.steady_course import FEWEST_PLACES, SteadyCourse, steady_course
+from gramoscope.quality import FlagArray, Quality, no_flags
+from gramoscope.signal_path import StillPicture
+
+MAD_TO_SIGMA = 1.4826
+COARSE_SIGMA_PX = 3.0
+"""Error of the coarse course."""
+GREATEST_STEP_PX = 2.5
+"""In one round no column moves its place by more."""
+GUIDE_SIGMA_PX = 2.5
+"""Error of the coarse course where nothing else leads."""
+LEAST_SIGMA_PX = 1e-3
+"""No place is claimed to be known better than this."""
+LEAST_SHARE = 0.02
+"""An edge that is seen in less than this share of the columns is not seen."""
+
+
+@dataclass(frozen=True, eq=False)
+class SharpEdge:
+    """An edge, column by column.
+
+    Attributes
+    ----------
+    row_px, row_sigma_px : float64 arrays, shape (column,)
+        Where it was not measured, the smooth course and its error; NaN where there is no edge to follow.
+    flags : uint16 array, shape (column,)
+    correlation_samples : float
+        How many neighbouring columns share one error.
+    """
+
+    row_px: FloatArray
+    row_sigma_px: FloatArray
+    flags: FlagArray
+    correlation_samples: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Round:
+    """One round of looking."""
+
+    band: EdgeBand
+    profile: EdgeProfile
+    places: ColumnPlaces
+    course: SteadyCourse
+    row: FloatArray
+    variance: FloatArray
+    measured: BoolArray
+    settled: SteadyCourse
+
+
+@dataclass(frozen=True)
+class Sharpening:
+    """How places are found.
+
+    Parameters
+    ----------
+    rounds : int
+        Rounds of learning and looking.
+    dust_gate : float
+        A pixel so many standard deviations off the profile is dust.
+    column_gate : float
+        A place so many standard errors off the smooth course is an outlier.
+    most_lost : float
+        A column that has lost more of its information than this share is not measured.
+    most_pooled : float
+        Largest standard deviation, in columns, of the window over which places are pooled where the edge allows it
+        (`pooling`); 0 keeps every column to itself.
+    least_amplitude : float
+        Where less of the profile is seen than this there is no edge.
+    """
+
+    rounds: int = 6
+    dust_gate: float = 4.0
+    column_gate: float = 4.0
+    most_lost: float = 0.6
+    most_pooled: float = 2.0
+    least_amplitude: float = 0.3
+
+    def __post_init__(self) -> None:
+        require(self.rounds >= 2, f"{self.rounds} rounds of looking", "at least two")
+        for name in ("dust_gate", "column_gate"):
+            require(getattr(self, name) > 2, f"{name} is {getattr(self, name)}", "above 2 standard errors")
+        require(0 < self.most_lost < 1, f"most_lost is {self.most_lost}", "between 0 and 1")
+        require(self.most_pooled >= 0, f"most_pooled is {self.most_pooled} columns", "0 or more")
+        require(0 <= self.least_amplitude < 1, f"least_amplitude is {self.least_amplitude}", "from 0, below 1")
+
+    def sharpen(
+        self, picture: StillPicture, coarse: FloatArray, *, wall: int, half_px: int, burnt: int, line: bool = False
+    ) -> SharpEdge | None:
+        """Return the place of an edge in every column.
+
+        Parameters
+        ----------
+        picture : StillPicture
+        coarse : float64 array, shape (column,)
+            Its course, to a few pixels.
+        wall : int
+            `INNER` or `OUTER`.
+        half_px : int
+            So many rows on each side of the course are looked at.
+        burnt : int
+            From this pixel value on a pixel is burnt.
+        line : bool
+            Whether it is a lone line, with the same on both sides; then its place is that of the line.
+
+        Returns
+        -------
+        SharpEdge or None
+            None where hardly a column shows the edge.
+        """
+        inside = (coarse > 0) & (coarse < picture.image.shape[0] - 1)
+        if np.count_nonzero(inside) < max(FEWEST_PLACES, LEAST_SHARE * coarse.size):
+            return None
+        settled = steady_course(coarse, np.full(coarse.size, COARSE_SIGMA_PX**-2))
+        guide = settled.row
+        seen, kept = None, None
+        for number in range(self.rounds):
+            band = edge_band(picture, settled.row, wall=wall, half_px=half_px, burnt=burnt)
+            # where nothing is measured yet the coarse course leads, so that it can be found again
+            leading = guide if number < self.rounds - 1 else None
+            seen = self._look(band, settled, kept, inside, leading, line=line, gated=number >= self.rounds // 2)
+            if seen is None:
+                return None
+            kept, settled = seen.places.kept, seen.settled
+        return None if seen is None else self._edge(seen, inside)
+
+    def _look(
+        self,
+        band: EdgeBand,
+        course: SteadyCourse,
+        kept: BoolArray | None,
+        inside: BoolArray,
+        guide: FloatArray | None,
+        *,
+        line: bool,
+        gated: bool,
+    ) -> _Round | None:
+        """One round: profile, places, course; None when hardly anything is measured."""
+        profile = learn_profile(band, band.usable if kept is None else kept & band.usable, line=line)
+        places = column_places(band, profile, band.usable, dust_gate=self.dust_gate, settled=guide is None)
+        step = np.clip(places.step, -GREATEST_STEP_PX, GREATEST_STEP_PX)
+        # a column that leaves its edge anywhere in the band says nothing
+        seen = inside & (places.lost < self.most_lost) & (places.variance < (0.25 * band.level.shape[1]) ** 2)
+        seen &= profile.amplitude > self.least_amplitude
+        if np.count_nonzero(seen) < max(FEWEST_PLACES, LEAST_SHARE * seen.size):
+            return None
+        variance = np.maximum(np.where(seen, places.variance, 1.0), LEAST_SIGMA_PX**2)
+        if gated:
+            scale = _scale(step[seen] / np.sqrt(variance[seen]))
+            seen &= np.abs(places.step) < self.column_gate * np.sqrt(scale**2 * variance + course.variance)
+        row = course.row + band.towards_land * (step + profile.middle_px)
+        weight = seen / (variance * (1 + 2 * places.likeness[1:].sum()))
+        if guide is None:
+            # as stiff as before: noise that is judged more strictly now is no reason to follow less
+            settled = steady_course(row, weight, stiffness=course.stiffness)
+        else:
+            leading = inside & ~seen & ~band.burnt.any(axis=1)
+            settled = steady_course(np.where(leading, guide, row), np.where(leading, GUIDE_SIGMA_PX**-2, weight))
+        return _Round(band, profile, places, course, row, variance, seen, settled)
+
+    def _edge(self, last: _Round, inside: BoolArray) -> SharpEdge:
+        measured, bridge = last.measured, last.settled
+        found = self._pooled(last)
+        row = bridge.row + np.where(measured, found.value, 0.0)
+        sigma = np.sqrt(np.where(measured, found.variance, bridge.variance))
+        nowhere = ~inside | (sigma > last.band.level.shape[1])
+        row[nowhere], sigma[nowhere] = np.nan, np.nan
+        return SharpEdge(row, sigma, self._flags(last, inside), found.correlation_samples)
+
+    def _pooled(self, last: _Round) -> Pooled:
+        """Deviations from the last course, pooled as far as it allows."""
+        shared = 1 + 2 * last.places.likeness[1:].sum()
+        weight = 1 / float(np.median(last.variance[last.measured]) * shared)
+        columns = pool_columns(weight, last.settled.stiffness, most=self.most_pooled)
+        off = last.row - last.settled.row
+        scale = _scale(off[last.measured] / np.sqrt(last.variance[last.measured]))
+        return pooled(off, scale**2 * last.variance, last.measured, last.places.likeness, columns=columns)
+
+    def _flags(self, last: _Round, inside: BoolArray) -> FlagArray:
+        """Why a column was not measured."""
+        lost = last.places.lost >= self.most_lost
+        burnt = lost & (last.band.burnt.mean(axis=1) > 0.2)
+        nothing = ~inside | (last.profile.amplitude <= self.least_amplitude)
+        flags = no_flags(last.row.size)
+        flags[nothing] |= np.uint16(Quality.NO_STRIPE)
+        flags[burnt & ~nothing] |= np.uint16(Quality.SATURATED)
+        flags[~burnt & ~nothing] |= np.uint16(Quality.OUTLIER)
+        flags[~last.measured] |= np.uint16(Quality.INTERPOLATED)
+        flags[last.measured] = 0
+        return flags
+
+
+def _scale(pull: FloatArray) -> float:
+    """By how much places scatter about their course more than their errors say: the edge itself may be ragged."""
+    return max(1.0, MAD_TO_SIGMA * float(np.median(np.abs(pull))))

@@ -1,0 +1,200 @@
+"""Sixteen numbers of single precision as one vector of the processor: what a compiler does not find by itself.
+
+Numba's loops over sixteen channels, or sixteen rows, are split where they need not be, and what they add up goes to memory and
+comes back. Told that sixteen numbers are one vector, LLVM keeps sums in registers, whatever the processor has, and windows are
+followed, mixed and whitened in half the time. Arrays are C-contiguous and given with the place in them where to begin, counted
+in numbers, for making views costs as much as the work; all lengths are in numbers too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+LANES = 16
+AT_ONCE = 4
+"""So many columns are worked on together: what they share is read once."""
+_REAL, _LONG, _INT = ir.FloatType(), ir.IntType(64), ir.IntType(32)
+_VECTOR = ir.VectorType(_REAL, LANES)
+_ANY = ir.Constant(_VECTOR, ir.Undefined)
+_SAME = ir.Constant(ir.VectorType(_INT, LANES), [0] * LANES)
+Value = Any
+"""Of LLVM, in the making."""
+_compiled: Any = intrinsic
+"""Numba's own types count the context, which only the compiler gives, as an argument."""
+
+
+class _Writer:
+    """Writes code about arrays; `arguments` are those of the function, arrays as pointers."""
+
+    def __init__(self, context: Any, builder: Any, signature: Any, values: Any) -> None:
+        self.builder = builder
+        self.arguments = [
+            context.make_array(kind)(context, builder, value).data
+            if isinstance(kind, types.Array)
+            else context.cast(builder, value, kind, types.intp)
+            for kind, value in zip(signature.args, values, strict=True)
+        ]
+
+    def plus(self, one: Value, other: Value | int) -> Value:
+        return self.builder.add(one, ir.Constant(_LONG, other) if isinstance(other, int) else other)
+
+    def times(self, one: Value, other: Value | int) -> Value:
+        return self.builder.mul(one, ir.Constant(_LONG, other) if isinstance(other, int) else other)
+
+    def load(self, array: Value, place: Value) -> Value:
+        return self.builder.load(self._at(array, place), align=4)
+
+    def store(self, value: Value, array: Value, place: Value) -> None:
+        self.builder.store(value, self._at(array, place), align=4)
+
+    def _at(self, array: Value, place: Value) -> Value:
+        return self.builder.bitcast(self.builder.gep(array, [place]), _VECTOR.as_pointer())
+
+    def spread(self, array: Value, place: Value) -> Value:
+        """One number, in all places of a vector."""
+        value = self.builder.load(self.builder.gep(array, [place]))
+        first = self.builder.insert_element(_ANY, value, ir.Constant(_INT, 0))
+        return self.builder.shuffle_vector(first, _ANY, _SAME)
+
+    def times_and(self, one: Value, other: Value, more: Value) -> Value:
+        """The product of two vectors, and one more vector added."""
+        kind = ir.FunctionType(_VECTOR, [_VECTOR] * 3)
+        call = self.builder.module.declare_intrinsic(f"llvm.fmuladd.v{LANES}f32", fnty=kind)
+        return self.builder.call(call, [one, other, more])
+
+    def total(self, vector: Value) -> Value:
+        """The sum of a vector, halves first."""
+        for far in (8, 4, 2, 1):
+            order = ir.Constant(ir.VectorType(_INT, LANES), [(j + far) % LANES for j in range(LANES)])
+            vector = self.builder.fadd(vector, self.builder.shuffle_vector(vector, _ANY, order))
+        return self.builder.extract_element(vector, ir.Constant(_INT, 0))
+
+    def call_for(self, array: Value, place: Value) -> None:
+        """Tell the processor that this will be read soon; it may lie anywhere."""
+        kind = ir.FunctionType(ir.VoidType(), [ir.IntType(8).as_pointer(), _INT, _INT, _INT])
+        call = self.builder.module.declare_intrinsic("llvm.prefetch.p0i8", fnty=kind)
+        where = self.builder.bitcast(self.builder.gep(array, [place]), ir.IntType(8).as_pointer())
+        self.builder.call(call, [where, *(ir.Constant(_INT, flag) for flag in (0, 3, 1))])
+
+    def loop(self, count: Value, body: Callable[[Value], None]) -> None:
+        with cgutils.for_range(self.builder, count) as loop:
+            body(loop.index)
+
+    def sums(self, count: int) -> list[Value]:
+        """Vectors that loops add to, 0 to begin with."""
+        rooms = [cgutils.alloca_once(self.builder, _VECTOR) for _ in range(count)]
+        for room in rooms:
+            self.builder.store(ir.Constant(_VECTOR, [0.0] * LANES), room)
+        return rooms
+
+    def add_product(self, room: Value, one: Value, other: Value) -> None:
+        self.builder.store(self.times_and(one, other, self.builder.load(room)), room)
+
+
+def _function(arguments: tuple[Any, ...], write: Callable[[_Writer], None]) -> Any:
+    """Signature and code of a function that Numba can call."""
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Value:
+        write(_Writer(context, builder, signature, values))
+        return context.get_dummy_value()
+
+    places = tuple(one if isinstance(one, types.Array) else types.intp for one in arguments)
+    return types.void(*places), generate
+
+
+def _interpolation(w: _Writer) -> None:
+    picture, first, soon, taps, tap, window, place, rows = w.arguments
+    weight = [w.spread(taps, w.plus(tap, k)) for k in range(10)]
+
+    def lanes(number: Value) -> None:
+        row = w.times(number, LANES)
+        w.call_for(picture, w.plus(w.plus(first, soon), row))
+        seen = [w.load(picture, w.plus(w.plus(first, row), k)) for k in range(10)]
+        near, far = w.builder.fmul(weight[3], seen[3]), w.builder.fmul(weight[0], seen[0])
+        for k in (4, 5, 6, 8):
+            near = w.times_and(weight[k], seen[k], near)
+        for k in (1, 2, 7, 9):
+            far = w.times_and(weight[k], seen[k], far)
+        w.store(w.builder.fadd(near, far), window, w.plus(place, row))
+
+    w.loop(w.builder.sdiv(rows, ir.Constant(_LONG, LANES)), lanes)
+
+
+def _mixture(w: _Writer) -> None:
+    window, first, rows, basis, begin, out, place = w.arguments
+    sums = w.sums(AT_ONCE)
+
+    def row(j: Value) -> None:
+        weight = w.load(basis, w.plus(begin, w.times(j, LANES)))
+        for k, room in enumerate(sums):
+            w.add_product(room, w.spread(window, w.plus(w.plus(first, j), w.times(rows, k))), weight)
+
+    w.loop(rows, row)
+    for k, room in enumerate(sums):
+        w.store(w.builder.load(room), out, w.plus(place, k * LANES))
+
+
+def _symmetric_filter(w: _Writer) -> None:
+    wide, middle, taps, reach, out, place = w.arguments
+    sums = w.sums(AT_ONCE)
+    weight = w.spread(taps, ir.Constant(_LONG, 0))
+    for k, room in enumerate(sums):
+        w.builder.store(w.builder.fmul(weight, w.load(wide, w.plus(middle, k * LANES))), room)
+
+    def pair(j: Value) -> None:
+        away = w.plus(j, 1)
+        weight, distance = w.spread(taps, away), w.times(away, LANES)
+        before, behind = w.builder.sub(middle, distance), w.plus(middle, distance)
+        for k, room in enumerate(sums):
+            both = w.builder.fadd(w.load(wide, w.plus(before, k * LANES)), w.load(wide, w.plus(behind, k * LANES)))
+            w.add_product(room, weight, both)
+
+    w.loop(reach, pair)
+    for k, room in enumerate(sums):
+        w.store(w.builder.load(room), out, w.plus(place, k * LANES))
+
+
+def _power(w: _Writer) -> None:
+    seen, first, form, begin, out, place = w.arguments
+    sums = w.sums(AT_ONCE)
+
+    def channel(c: Value) -> None:
+        row = w.load(form, w.plus(begin, w.times(c, LANES)))
+        for k, room in enumerate(sums):
+            w.add_product(room, w.spread(seen, w.plus(w.plus(first, c), k * LANES)), row)
+
+    w.loop(ir.Constant(_LONG, LANES), channel)
+    for k, room in enumerate(sums):
+        vector = w.builder.load(room)
+        total = w.total(w.builder.fmul(vector, vector))
+        w.builder.store(total, w.builder.gep(out, [w.plus(place, k)]))
+
+
+@_compiled
+def interpolate(_, picture, first, soon, taps, tap, window, place, rows):  # type: ignore[no-untyped-def]
+    """Write rows of a window, a multiple of 16, each from ten rows of a picture by ten taps."""
+    return _function((picture, first, soon, taps, tap, window, place, rows), _interpolation)
+
+
+@_compiled
+def mix(_, window, first, rows, basis, begin, out, place):  # type: ignore[no-untyped-def]
+    """Write sixteen weighted sums of the rows of a window, [column, row], by a basis [row, 16], for four columns."""
+    return _function((window, first, rows, basis, begin, out, place), _mixture)
+
+
+@_compiled
+def filter_symmetrically(_, wide, middle, taps, reach, out, place):  # type: ignore[no-untyped-def]
+    """Write four columns of [column, 16], filtered along the columns by taps given from their middle on."""
+    return _function((wide, middle, taps, reach, out, place), _symmetric_filter)
+
+
+@_compiled
+def power(_, seen, first, form, begin, out, place):  # type: ignore[no-untyped-def]
+    """Write |zᵀ P|² of four columns z of [column, 16], P being [16, 16]."""
+    return _function((seen, first, form, begin, out, place), _power)

@@ -1,0 +1,73 @@
+"""Sixteen numbers at a time: the same sums as NumPy's, wherever in an array they begin."""
+
+import numba
+import numpy as np
+
+from gramoscope.pickup.texture.vector_lanes import AT_ONCE, LANES, filter_symmetrically, interpolate, mix, power
+
+RNG = np.random.default_rng(5)
+
+
+def _normal(*shape: int) -> np.ndarray:
+    return RNG.normal(size=shape).astype(np.float32)
+
+
+@numba.njit
+def _interpolate(picture, first, soon, taps, tap, window, place, rows):  # type: ignore[no-untyped-def]
+    interpolate(picture, first, soon, taps, tap, window, place, rows)
+
+
+@numba.njit
+def _mix(window, first, rows, basis, begin, out, place):  # type: ignore[no-untyped-def]
+    mix(window, first, rows, basis, begin, out, place)
+
+
+@numba.njit
+def _filter(wide, middle, taps, reach, out, place):  # type: ignore[no-untyped-def]
+    filter_symmetrically(wide, middle, taps, reach, out, place)
+
+
+@numba.njit
+def _power(seen, first, form, begin, out, place):  # type: ignore[no-untyped-def]
+    power(seen, first, form, begin, out, place)
+
+
+def _outside(written: np.ndarray, place: int, count: int) -> np.ndarray:
+    return np.delete(written, slice(place, place + count))
+
+
+def test_rows_are_interpolated_from_ten() -> None:
+    picture, taps, window = _normal(90), _normal(30), np.zeros(60, np.float32)
+    # what is called for ahead may lie anywhere
+    _interpolate(picture, 7, 10**6, taps, 10, window, 5, 2 * LANES)
+    expected = np.correlate(picture[7 : 7 + 2 * LANES + 9].astype(float), taps[10:20].astype(float), "valid")
+    np.testing.assert_allclose(window[5 : 5 + 2 * LANES], expected, atol=1e-5)
+    assert not _outside(window, 5, 2 * LANES).any()
+
+
+def test_rows_are_mixed_by_a_basis() -> None:
+    rows = 7
+    window, basis, out = _normal(6, rows), _normal(rows + 2, LANES), np.zeros(3 + (AT_ONCE + 1) * LANES, np.float32)
+    _mix(window.ravel(), rows, rows, basis.ravel(), 2 * LANES, out, 3)
+    expected = window[1 : 1 + AT_ONCE].astype(float) @ basis[2:].astype(float)
+    np.testing.assert_allclose(out[3 : 3 + AT_ONCE * LANES].reshape(AT_ONCE, LANES), expected, atol=1e-5)
+    assert not _outside(out, 3, AT_ONCE * LANES).any()
+
+
+def test_columns_are_filtered_alike_to_both_sides() -> None:
+    reach = 3
+    wide, taps = _normal(AT_ONCE + 2 * reach + 1, LANES), _normal(reach + 1)
+    out = np.zeros((AT_ONCE + 2) * LANES, np.float32)
+    _filter(wide.ravel(), (reach + 1) * LANES, taps, reach, out, LANES)
+    both = np.concatenate([taps[:0:-1], taps]).astype(float)
+    expected = np.stack([both @ wide[1 + x : 1 + x + both.size].astype(float) for x in range(AT_ONCE)])
+    np.testing.assert_allclose(out[LANES:-LANES].reshape(AT_ONCE, LANES), expected, atol=1e-5)
+    assert not _outside(out, LANES, AT_ONCE * LANES).any()
+
+
+def test_the_power_of_a_column_is_that_of_what_a_form_makes_of_it() -> None:
+    seen, form, out = _normal(AT_ONCE + 1, LANES), _normal(LANES, LANES), np.zeros(AT_ONCE + 2, np.float32)
+    _power(seen.ravel(), LANES, form.ravel(), 0, out, 1)
+    expected = ((seen[1:].astype(float) @ form.astype(float)) ** 2).sum(axis=1)
+    np.testing.assert_allclose(out[1:-1], expected, rtol=1e-5)
+    assert not _outside(out, 1, AT_ONCE).any()
