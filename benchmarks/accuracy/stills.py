@@ -62,14 +62,15 @@ class Case:
     scan: bool = False
 
 
-BASE = StillScene(turns=12, turn_px=40_960)
+BASE = StillScene(turns=12, turn_px=157_080)
 CASES = (
-    Case("12 turns, dust: 60 specks a metre", BASE),
-    Case("3 turns", replace(BASE, turns=3)),
-    Case("… three times the grain (3 %), twice the noise", replace(BASE, turns=3, grain=0.03, noise=2.0)),
-    Case("… ten times the dust", replace(BASE, turns=3, dust_per_m=600.0)),
-    Case("… cut vertically", replace(BASE, turns=3, disc=Disc(cut="vertical", groove_width_m=140e-6))),
-    Case("… pixels of 8 µm", replace(BASE, turns=3, turn_px=20_480, pixel_pitch_m=8e-6), pictures=10),
+    Case("12 turns at a radius of 100 mm, dust: 60 specks a metre", BASE, pictures=80),
+    Case("1 turn", replace(BASE, turns=1)),
+    Case("… three times the grain (3 %), twice the noise", replace(BASE, turns=1, grain=0.03, noise=2.0)),
+    Case("… ten times the dust", replace(BASE, turns=1, dust_per_m=600.0)),
+    Case("… cut vertically", replace(BASE, turns=1, disc=Disc(cut="vertical", groove_width_m=140e-6))),
+    Case("… at a radius of 26 mm", replace(BASE, turns=1, turn_px=40_960), pictures=5),
+    Case("… pixels of 8 µm", replace(BASE, turns=1, turn_px=78_540, pixel_pitch_m=8e-6), pictures=10),
     Case(
         "a scan of 2200 × 2200 pixels of 20 µm, straightened; at 1 cm/s",
         StillScene(turns=5, turn_px=round(2 * np.pi * 1050), pixel_pitch_m=20e-6, level_m_s=0.01, dust_per_m=10.0),

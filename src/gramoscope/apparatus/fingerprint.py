@@ -6,9 +6,8 @@ import hashlib
 from collections.abc import Iterable
 from pathlib import Path
 
-
 PIECE_BYTES = 1 << 20
-"""Files are summed in such pieces: small ones would ask for the interpreter's lock too often, large ones fall out of the cache."""
+"""Files are summed in such pieces: smaller ones ask for the interpreter too often, larger ones fall out of the cache."""
 
 
 def sha256_of_file(path: Path) -> str:

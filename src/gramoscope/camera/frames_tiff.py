@@ -121,8 +121,9 @@ def _page(tiff: tifffile.TiffFile, index: int, *, path: Path, sensor: Sensor) ->
 def _as_it_lies(tiff: tifffile.TiffFile, page: Any) -> Frame:
     """Return a page that is stored as an array, read without a detour."""
     frame = np.empty(page.shape, tiff.byteorder + page.dtype.char)
-    tiff.filehandle.seek(page.dataoffsets[0])
-    if tiff.filehandle.readinto(frame) != frame.nbytes:
+    file: Any = tiff.filehandle  # which reads into any buffer, whatever its annotations say
+    file.seek(page.dataoffsets[0])
+    if file.readinto(frame) != frame.nbytes:
         raise ValueError("the file ends within a page")
     return frame.astype(page.dtype, copy=False)
 

@@ -262,7 +262,7 @@ def to_phases(shift_px: FloatArray) -> FloatArray:
         return shift_px
     near: FloatArray = np.rint(PHASES * shift_px) / PHASES
     # the same fractions to the last bit
-    return near + np.rint((shift_px - near).mean() * 2**20) / 2**20
+    return np.asarray(near + np.rint((shift_px - near).mean() * 2**20) / 2**20)
 
 
 def frames_in(width: int, shift_px: FloatArray) -> npt.NDArray[np.int64]:

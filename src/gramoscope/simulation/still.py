@@ -35,6 +35,7 @@ from gramoscope.turntable.wow import Wow
 Picture = npt.NDArray[np.uint8]
 GRAIN_STREAM, NOISE_STREAM = 0x57111, 0x57112
 GRAIN_PX = 0.8
+GRAIN_BLOCK_PX, GRAIN_MARGIN_PX = 512, 8
 
 
 @dataclass(frozen=True)
@@ -145,7 +146,7 @@ def still_picture(scene: StillScene, passage: Passage, start: int = 0, stop: int
     light = np.full((scene.rows, stop - start), scene.land)
     for turn in range(scene.turns + 1):
         _draw_turn(light, scene, passage, turn, angle_px)
-    light *= 1 + scene.grain * _grain(scene)[:, angle_px]
+    light *= 1 + scene.grain * _grain(scene, start, stop)
     for mark in _dust(scene):
         _lay(light, mark, scene, angle_px)
     noise = np.random.default_rng([scene.seed, NOISE_STREAM, start]).standard_normal(light.shape)
@@ -195,11 +196,20 @@ def _draw_turn(
     light[rows[inside], columns[inside]] += drawn[inside]
 
 
-def _grain(scene: StillScene) -> FloatArray:
+def _grain(scene: StillScene, start: int, stop: int) -> FloatArray:
     """The surface's own brightness, fixed to the record; it closes upon itself after a turn."""
-    rng = np.random.default_rng([scene.seed, GRAIN_STREAM])
-    grain = gaussian_filter(rng.standard_normal((scene.rows, scene.turn_px)), GRAIN_PX, mode=("nearest", "wrap"))
-    return np.asarray(grain / grain.std(), np.float64)
+    first = start - GRAIN_MARGIN_PX
+    columns = np.arange(first, stop + GRAIN_MARGIN_PX) % scene.turn_px
+    white = np.empty((scene.rows, columns.size))
+    for block in np.unique(columns // GRAIN_BLOCK_PX):
+        rng = np.random.default_rng([scene.seed, GRAIN_STREAM, int(block)])
+        here = np.flatnonzero(columns // GRAIN_BLOCK_PX == block)
+        white[:, here] = rng.standard_normal((GRAIN_BLOCK_PX, scene.rows)).T[:, columns[here] - block * GRAIN_BLOCK_PX]
+    point = np.zeros(2 * GRAIN_MARGIN_PX + 1)
+    point[GRAIN_MARGIN_PX] = 1.0
+    spread = float((gaussian_filter(point, GRAIN_PX) ** 2).sum())
+    grain = gaussian_filter(white, GRAIN_PX, mode="nearest") / spread
+    return np.asarray(grain[:, GRAIN_MARGIN_PX : white.shape[1] - GRAIN_MARGIN_PX], np.float64)
 
 
 def _dust(scene: StillScene) -> Iterator[Mark]:

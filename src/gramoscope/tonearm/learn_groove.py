@@ -72,6 +72,25 @@ class PriorLimits:
 
 
 @dataclass(frozen=True, eq=False)
+class Lesson:
+    """What a stretch tells of one direction.
+
+    Attributes
+    ----------
+    seen : OneDirection
+    level : float
+        How loud it is.
+    correlation_samples : float
+        How many neighbours share one error (`WallTrace`). To what is slower than that such readings are like independent
+        ones of so many times the variance.
+    """
+
+    seen: OneDirection
+    level: float
+    correlation_samples: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
 class Lessons:
     """What some stretches teach of one direction: readings, how loud each is, and the mean square of its slopes."""
 
@@ -80,20 +99,21 @@ class Lessons:
     slope_power: FloatArray
 
 
-def lessons(stretches: Iterable[tuple[OneDirection, float]], step_m: float) -> Lessons | None:
-    """Return what stretches of given levels teach; None when all were hardly seen."""
-    seen = [(one, level) for one, level in stretches if one.known >= LEAST_SAMPLES]
+def lessons(stretches: Iterable[Lesson], step_m: float) -> Lessons | None:
+    """Return what all stretches teach together; None when all were hardly seen."""
+    seen = [lesson for lesson in stretches if lesson.seen.known >= LEAST_SAMPLES]
     if not seen:
         return None
-    power = [slope_power(one, step_m) for one, _ in seen]
-    readings = one_after_the_other([_counted_from_the_first(one) for one, _ in seen])
-    return Lessons(readings, np.array([level for _, level in seen]), np.array(power))
+    power = [slope_power(lesson.seen, step_m) for lesson in seen]
+    readings = one_after_the_other([_counted_from_the_first(lesson) for lesson in seen])
+    return Lessons(readings, np.array([lesson.level for lesson in seen]), np.array(power))
 
 
-def _counted_from_the_first(one: OneDirection) -> tuple[IntArray, FloatArray, FloatArray]:
+def _counted_from_the_first(lesson: Lesson) -> tuple[IntArray, FloatArray, FloatArray]:
+    one = lesson.seen
     known = np.flatnonzero(np.isfinite(one.place_m))
     place = one.place_m[known]
-    return known - known[0], place - place[0], one.variance[known]
+    return known - known[0], place - place[0], lesson.correlation_samples * one.variance[known]
 
 
 def learn(

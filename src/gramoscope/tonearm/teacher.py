@@ -14,7 +14,7 @@ from gramoscope.disc.formats import Direction
 from gramoscope.tonearm.course import Course
 from gramoscope.tonearm.groove_model import Beliefs, GrooveModel, agitation, beginning, beliefs, moves, robustly
 from gramoscope.tonearm.groove_prior import GroovePrior
-from gramoscope.tonearm.learn_groove import PriorLimits, learn, lessons
+from gramoscope.tonearm.learn_groove import Lesson, PriorLimits, learn, lessons
 from gramoscope.tonearm.level import (
     OneDirection,
     Walls,
@@ -105,11 +105,18 @@ class Teacher:
         chosen = [batch[i] for i in np.linspace(0, len(batch) - 1, count).round().astype(int)]
         believed = beliefs(before or (limits[0].middle, limits[1].middle), self.step_m)
         cleaned = [(self._cleaned(believed, stretch, level), level) for stretch, level in chosen]
-        error = claim_error(trusted(stretch) for stretch, _ in cleaned)
+        # an error that neighbours share does not show in their differences: such a claim is believed
+        error = claim_error(trusted(stretch) for stretch, _ in cleaned if stretch.correlation_samples == 1)
         teachers = [(_put_right(stretch, error), level) for stretch, level in cleaned]
         lateral, vertical = (
             learn(
-                lessons(((self._seen(trusted(s), name), float(level[i])) for s, level in teachers), self.step_m),
+                lessons(
+                    (
+                        Lesson(self._seen(trusted(s), name), float(level[i]), s.correlation_samples)
+                        for s, level in teachers
+                    ),
+                    self.step_m,
+                ),
                 self.step_m,
                 limits[i],
                 before=before[i] if before else None,

@@ -110,5 +110,7 @@ def mean_level(pictures: list[Float32Array]) -> float:
 
     Only the parts of a picture that were drawn count (`overlay`): the others are black.
     """
-    means: FloatArray = np.array([float(picture.sum()) / max(int(np.count_nonzero(picture)), 1) for picture in pictures])
+    means: FloatArray = np.array(
+        [float(picture.sum()) / max(int(np.count_nonzero(picture)), 1) for picture in pictures]
+    )
     return max(float(np.median(means)), 0.01)

@@ -27,6 +27,7 @@ Value = Any
 """Of LLVM, in the making."""
 _compiled: Any = intrinsic
 """Numba's own types count the context, which only the compiler gives, as an argument."""
+_room: Any = cgutils.alloca_once
 
 
 class _Writer:
@@ -88,7 +89,7 @@ class _Writer:
 
     def sums(self, count: int) -> list[Value]:
         """Vectors that loops add to, 0 to begin with."""
-        rooms = [cgutils.alloca_once(self.builder, _VECTOR) for _ in range(count)]
+        rooms = [_room(self.builder, _VECTOR) for _ in range(count)]
         for room in rooms:
             self.builder.store(ir.Constant(_VECTOR, [0.0] * LANES), room)
         return rooms
