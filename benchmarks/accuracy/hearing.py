@@ -16,7 +16,7 @@ import numpy as np
 from gramoscope.apparatus.capture import Capture, open_capture
 from gramoscope.conventions import FloatArray, stereo_of_motion
 from gramoscope.disc.formats import Cut, Direction, direction_of_cut
-from gramoscope.player.play import learned
+from gramoscope.player.film import learned
 from gramoscope.player.recipe import Recipe
 from gramoscope.player.workers import in_order
 from gramoscope.preamp.resample import Resampler

@@ -27,7 +27,7 @@ from gramoscope.pickup.device import Device
 from gramoscope.pickup.texture.reading import read
 from gramoscope.pickup.texture_likelihood import TexturePickup, samples_of, sight_of
 from gramoscope.player.devices import DEVICES, device_named
-from gramoscope.player.play import learned
+from gramoscope.player.film import learned
 from gramoscope.player.recipe import load_recipe
 from gramoscope.player.workers import in_order
 from gramoscope.preamp.resample import Resampler

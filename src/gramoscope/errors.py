@@ -7,6 +7,8 @@
     │   └── NoFramesError                     the manifest is fine, and not one frame can be read
     ├── SoundError                            a sound file cannot be read, or is of no use
     ├── TransferError                         a folder is no whole transfer: no report, a file missing, a sum that differs
+    ├── FilmingError                          a film that is followed does not go on
+    ├── WorkerError                           a worker of a cluster cannot read, or would read otherwise
     └── OutputError                           the results cannot be written: a full disk, a folder without permission
 
 An exception is for the caller's failure. Where the *world* fails locally (dust, a chipped wall, a lost frame) nothing is
@@ -73,6 +75,14 @@ class TransferError(GramoscopeError):
 
 class OutputError(GramoscopeError):
     """The results cannot be written."""
+
+
+class FilmingError(GramoscopeError):
+    """A film that is followed does not go on."""
+
+
+class WorkerError(GramoscopeError):
+    """Somebody who is to read pieces of a passage cannot, or would read otherwise."""
 
 
 def require(condition: bool, found: str, needed: str = "", remedy: str = "") -> None:

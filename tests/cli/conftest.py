@@ -108,6 +108,14 @@ def capture(here: Path, bench: Path, tone: Path) -> Path:
     return folder
 
 
+@pytest.fixture(scope="session")
+def longer_capture(here: Path, tone: Path, bench: Path) -> Path:
+    """Twenty groups: a second or two of playing."""
+    command = ["film", tone, here / "longer", "--bench", bench, "--seconds", 0.01, "--quiet"]
+    assert main([str(part) for part in command]) == 0
+    return here / "longer"
+
+
 @pytest.fixture
 def copy_of(capture: Path, tmp_path: Path) -> Path:
     """A copy of the capture, to be spoilt."""

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gramoscope.apparatus.bench import Bench
+from gramoscope.apparatus.filming import MARKER
 from gramoscope.apparatus.fingerprint import sha256_of_file, sha256_of_files
 from gramoscope.apparatus.frame_log import FrameLog, nominal_arc_m, read_log
 from gramoscope.apparatus.manifest import MANIFEST_NAME, Manifest, read_manifest
@@ -75,7 +76,8 @@ class Capture:
     @property
     def problems(self) -> tuple[str, ...]:
         """What is wrong with the capture as a whole, in words; a group's own problems are in the group."""
-        return self.log.problems if self.log is not None else ()
+        filming = (f"{MARKER} says that it is still being filmed",) if (self.folder / MARKER).is_file() else ()
+        return (*(self.log.problems if self.log is not None else ()), *filming)
 
     def group(self, number: int) -> FrameGroup:
         """Read one stretch.
@@ -95,12 +97,28 @@ class Capture:
         ArgumentError
             If there is no such group.
         """
+        return self._group(
+            number, lambda images, valid, remarks: self._read_into(images, valid, remarks, number=number)
+        )
+
+    def unread_group(self, number: int, why: str) -> FrameGroup:
+        """Return a stretch none of whose frames could be read, for a reason that is not in the capture.
+
+        Parameters
+        ----------
+        number : int
+        why : str
+            For the group's problems.
+        """
+        return self._group(number, lambda images, valid, remarks: remarks.add(why))
+
+    def _group(self, number: int, fill: Callable[[ImageArray, npt.NDArray[np.bool_], _Remarks], None]) -> FrameGroup:
         require(0 <= number < self.group_count, f"group {number}", f"0 … {self.group_count - 1}")
         sequence, sensor = self.bench.sequence, self.bench.sensor
         images: ImageArray = np.empty((sequence.frames_per_group, sensor.height_px, sensor.width_px), sensor.dtype)
         valid = np.zeros(sequence.frames_per_group, np.bool_)
         remarks = _Remarks()
-        self._read_into(images, valid, remarks, number=number)
+        fill(images, valid, remarks)
         images[~valid] = 0
         arc_start_m, stage_m = self._places(number, remarks)
         return FrameGroup(

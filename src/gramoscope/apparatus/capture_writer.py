@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gramoscope.apparatus.bench import Bench
+from gramoscope.apparatus.filming import say_done, say_whole
 from gramoscope.apparatus.frame_log import HEADER, STAGE, nominal_arc_m
 from gramoscope.apparatus.manifest import MANIFEST_NAME, write_manifest
 from gramoscope.camera.frames import Frame
@@ -65,6 +66,9 @@ class CaptureWriter:
         Whether TIFF (deflate), PNG and Zarr (zstd) spend time on smaller files; a video always does.
     overwrite : bool
         Whether an existing capture may be replaced. Until the new one is whole the old one stays.
+    live : bool
+        Film in place, so that somebody can follow (`apparatus.filming`): manifest first, log and marker after every group, in
+        order. A live film that fails leaves nothing; one that is killed leaves its groups and the marker.
 
     Raises
     ------
@@ -82,19 +86,30 @@ class CaptureWriter:
         layout: WrittenLayout = "tiff",
         compress: bool = False,
         overwrite: bool = False,
+        live: bool = False,
     ) -> None:
         require(layout in PATTERNS, f"layout {layout!r}", " or ".join(PATTERNS))
+        require(
+            not (live and layout == "video"), "a live video", "tiff, png or zarr", "a video can be read when it is done"
+        )
+        require(not (live and overwrite), "a live film over an earlier one", "a new folder")
         self.folder = Path(folder).absolute()
         self.bench = bench
         self.layout = layout
         self._overwrite = overwrite
         _require_free(self.folder, overwrite=overwrite)
-        self._staging = self.folder.parent / f".{self.folder.name}.{uuid.uuid4().hex[:8]}.partial"
+        self._live = live
+        hidden = self.folder.parent / f".{self.folder.name}.{uuid.uuid4().hex[:8]}.partial"
+        self._staging = self.folder if live else hidden
         self._rows: dict[int, list[tuple[str, ...]]] = {}
         self._lock = threading.Lock()
         with self._giving_up(), ctrl_c_waits():
             (self._staging / "frames").mkdir(parents=True)
             self._shelf = _shelf(self._staging, bench, layout=layout, compress=compress)
+            if live:
+                say_whole(self._staging, 0)
+                _write_log(self._staging / LOG_NAME, [])
+                write_manifest(self._staging / MANIFEST_NAME, bench, frames=PATTERNS[layout], log=LOG_NAME)
 
     def __enter__(self) -> Self:
         return self
@@ -149,11 +164,17 @@ class CaptureWriter:
             require(number not in self._rows, f"group {number} comes twice", "each group once")
             in_order = self.layout != "video" or number == len(self._rows)
             require(in_order, f"group {number} comes after {len(self._rows)} others", "a video's groups in order")
+            later = self._live and number < max(self._rows, default=0)
+            require(not later, f"group {number} comes after a later one", "a live film's groups in order")
             self._rows[number] = rows
             if self.layout == "video":
                 self._put(number, stored)
         if self.layout != "video":
             self._put(number, stored)
+        if self._live:
+            with _output_errors(self.folder):
+                _write_log(self._staging / LOG_NAME, rows, more=True)
+                say_whole(self._staging, number + 1)
 
     def _put(self, number: int, stored: Frame) -> None:
         with _output_errors(self.folder):
@@ -164,7 +185,11 @@ class CaptureWriter:
         frames = self._staging / "frames"
         if not any(frames.iterdir()):
             frames.rmdir()
-        _write_log(self._staging / LOG_NAME, [row for _, rows in sorted(self._rows.items()) for row in rows])
+        if not self._live:
+            _write_log(self._staging / LOG_NAME, [row for _, rows in sorted(self._rows.items()) for row in rows])
+        if self._live:
+            say_done(self._staging)
+            return
         write_manifest(self._staging / MANIFEST_NAME, self.bench, frames=PATTERNS[self.layout], log=LOG_NAME)
         _require_free(self.folder, overwrite=self._overwrite)
         _move_into_place(self._staging, self.folder)
@@ -234,10 +259,11 @@ def _micrometres(value_m: float) -> str:
     return f"{float(value_m) * MICROMETRES_PER_METRE:.6f}"
 
 
-def _write_log(path: Path, rows: list[tuple[str, ...]]) -> None:
-    with path.open("w", encoding="utf-8", newline="") as file:
+def _write_log(path: Path, rows: list[tuple[str, ...]], *, more: bool = False) -> None:
+    with path.open("a" if more else "w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow((*HEADER, STAGE))
+        if not more:
+            writer.writerow((*HEADER, STAGE))
         writer.writerows(rows)
 
 

@@ -71,6 +71,43 @@ def read_log(path: Path, *, sequence: Sequence) -> FrameLog:
         return FrameLog(empty, empty, problems=(f"{path.name} {reason}; nominal places are used",))
 
 
+class GrowingLog:
+    """A log that is still being written; `grow` reads what came since.
+
+    Parameters
+    ----------
+    path : Path
+    sequence : Sequence
+
+    Attributes
+    ----------
+    log : FrameLog
+        Its arrays fill as the log grows.
+    """
+
+    def __init__(self, path: Path, *, sequence: Sequence) -> None:
+        empty = np.full((sequence.groups, sequence.frames_per_group), np.nan)
+        self.log = FrameLog(empty, empty.copy())
+        self._path, self._read_bytes = path, 0
+        self._header: tuple[str, ...] = ()
+
+    def grow(self) -> None:
+        """Read the lines that are whole by now; what is wrong with one is left out, and found when the film is done."""
+        try:
+            with self._path.open("rb") as file:
+                file.seek(self._read_bytes)
+                new = file.read()
+        except FileNotFoundError:
+            return
+        whole = new[: new.rfind(b"\n") + 1]
+        self._read_bytes += len(whole)
+        for row in csv.reader(whole.decode("utf-8-sig", errors="replace").splitlines()):
+            if not self._header:
+                self._header = tuple(name.strip() for name in row)
+            elif row:
+                _enter(row, self.log.arc_m, self.log.stage_m, has_stage=STAGE in self._header)
+
+
 def _filled(rows: Iterator[list[str]], empty: FloatArray, *, name: str, has_stage: bool) -> FrameLog:
     arc_m, stage_m = empty.copy(), empty.copy()
     problems = []

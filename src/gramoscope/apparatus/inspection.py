@@ -146,6 +146,11 @@ def inspect(capture: Capture, *, quick: bool = False, progress: Callable[[int, i
     )
 
 
+def frame_bytes(bench: Bench) -> int:
+    """Return the size of a frame as the camera gives it, uncompressed."""
+    return int(np.prod(bench.sensor.frame_shape)) * np.dtype(bench.sensor.dtype).itemsize
+
+
 def finding_of_group(group: FrameGroup) -> GroupFinding:
     """Return what is wrong with the frames of one group.
 

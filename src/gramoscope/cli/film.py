@@ -39,6 +39,7 @@ def film(
     rows: Literal["inward", "outward"] | None = None,
     compress: bool = False,
     overwrite: bool = False,
+    live: bool = False,
     workers: Workers = PROCESSORS,
     quiet: bool = False,
     json: bool = False,
@@ -95,6 +96,8 @@ def film(
         Smaller files, slower to read.
     overwrite
         Replace an earlier capture.
+    live
+        Film in place, so that `gramoscope play CAPTURE --out DIR --follow` can play along.
     workers
         Groups rendered at the same time; the pictures do not depend on it.
     quiet
@@ -152,6 +155,7 @@ def film(
             layout,
             compress=compress,
             overwrite=overwrite,
+            live=live,
             workers=workers,
             progress=progress,
         )

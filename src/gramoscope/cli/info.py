@@ -2,18 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gramoscope.cli.terminal import FINE, FOUND_WRONG, Terminal
+from gramoscope.cli.terminal import FINE, FOUND_WRONG, PROCESSORS, Terminal, Workers
 
 if TYPE_CHECKING:
     from gramoscope.apparatus.inspection import Inspection
+    from gramoscope.player.plan import Plan
 
 SHOWN_GROUPS = 10
 
 
-def info(capture: Path, /, *, quick: bool = False, quiet: bool = False, json: bool = False) -> int:
+def info(
+    capture: Path,
+    /,
+    *,
+    quick: bool = False,
+    plan: bool = False,
+    recipe: str = "best",
+    workers: Workers = PROCESSORS,
+    quiet: bool = False,
+    json: bool = False,
+) -> int:
     """Say what is in a capture, what is wrong with it, and what it will sound like (rate, seconds).
 
     Exit code 1 when something is wrong: lost or useless frames, groups that do not overlap, stripes outside the picture.
@@ -24,6 +36,13 @@ def info(capture: Path, /, *, quick: bool = False, quiet: bool = False, json: bo
         Folder with `capture.toml` and frames or pictures, or one picture.
     quick
         Read a few groups only, and see whether the other files are there.
+    plan
+        Say what it takes to play it: disk, time and memory. The passage is learned and a few groups are read, to see how fast
+        this machine is.
+    recipe
+        For the plan: how to read.
+    workers
+        For the plan: stretches read at the same time.
     quiet
         Say nothing; the exit code tells.
     json
@@ -33,6 +52,8 @@ def info(capture: Path, /, *, quick: bool = False, quiet: bool = False, json: bo
     from gramoscope.apparatus.opening import opened
     from gramoscope.apparatus.still import StillCapture
     from gramoscope.cli.info_still import info_still
+    from gramoscope.player.plan import plan_of
+    from gramoscope.player.recipe import load_recipe
 
     terminal = Terminal(quiet, json)
     found_there = opened(capture)
@@ -40,8 +61,11 @@ def info(capture: Path, /, *, quick: bool = False, quiet: bool = False, json: bo
         return info_still(found_there, terminal, quick=quick)
     with terminal.progress("Looking") as progress:
         found = inspect(found_there, quick=quick, progress=progress)
-    terminal.result({**found.as_dict(), "sound": found.sound})
+    planned = plan_of(found_there, load_recipe(recipe), workers) if plan else None
+    terminal.result({**found.as_dict(), "sound": found.sound, **({"plan": asdict(planned)} if planned else {})})
     _tell(terminal, found)
+    if planned is not None:
+        _tell_plan(terminal, planned)
     return FINE if found.sound else FOUND_WRONG
 
 
@@ -78,3 +102,28 @@ def _tell(terminal: Terminal, found: Inspection) -> None:
         )
     if found.sound:
         terminal.say("[green]Nothing wrong was found.[/]")
+
+
+def _tell_plan(terminal: Terminal, plan: Plan) -> None:
+    workers, more = plan.workers, 16 * plan.workers
+    terminal.table(
+        {
+            "frames": f"{plan.frames_bytes / 1e9:.2f} GB in {plan.groups} groups",
+            "disk": f"{plan.store_bytes / 1e9:.2f} GB for the reading until the transfer is whole, "
+            f"{plan.sound_bytes / 1e9:.3f} GB of sound at 96 kHz",
+            "memory": f"{plan.working_bytes / 1e9:.2f} GB for the pieces of {workers} workers, whatever the length",
+            "learning": f"{plan.learning_s:.0f} s, once",
+            "time": f"{plan.group_s * 1e3:.0f} ms a group and worker: {_duration(plan.playing_s(workers))} with {workers}, "
+            f"{_duration(plan.playing_s(more))} with {more}",
+            "storage": f"{plan.bytes_a_second(workers) / 1e6:.0f} MB/s with {workers} workers, "
+            f"{plan.bytes_a_second(more) / 1e6:.0f} MB/s with {more}",
+        },
+        title="To play it takes",
+    )
+
+
+def _duration(seconds: float) -> str:
+    for unit, size in (("days", 86_400.0), ("hours", 3600.0), ("minutes", 60.0)):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.1f} {unit}"
+    return f"{seconds:.0f} s"

@@ -39,6 +39,13 @@ def play(
     force: bool = False,
     workers: Workers = PROCESSORS,
     device: Literal["cpu", "cuda"] = "cpu",
+    executor: Literal["threads", "processes", "dask"] = "threads",
+    scheduler: str | None = None,
+    restart: bool = False,
+    keep_reading: bool = False,
+    verify: bool = False,
+    follow: bool = False,
+    json_progress: bool = False,
     quiet: bool = False,
     json: bool = False,
 ) -> int:
@@ -52,6 +59,10 @@ def play(
     Repairs are made only when asked for, and can be undone: `flat.wav` stays as it is, and `repaired.wav`, `difference.wav`
     (what was taken off), `cues.json` and `labels.txt` (where, the latter for Audacity) come beside it. `equalised.wav` is then
     made of the repaired sound.
+
+    What was read lies in DIR/.reading.zarr until the transfer is whole. Whatever stops the command (Ctrl-C, a kill, a full
+    disk), the same command goes on from there, and the result is the same to the bit. What has changed since is noticed and
+    read again.
 
     What the film does not show (a chipped wall, a lost frame) is bridged, flagged and counted in the report.
 
@@ -113,6 +124,25 @@ def play(
     device
         What reads: cpu, or cuda, a graphics card by NVIDIA (needs `pip install "gramoscope[gpu]"`; recipe best only; so far
         checked in CUDA's simulator, not on a card). Both agree to rounding.
+    executor
+        Who reads: threads, processes, or the workers of Dask (needs `pip install "gramoscope[cluster]"`), on this machine
+        unless --scheduler says where. The result does not depend on it.
+    scheduler
+        Address of a Dask scheduler that runs already, such as tcp://10.0.0.1:8786, whatever started it. Its workers must see
+        the capture and DIR under the same paths.
+    restart
+        Throw away what an earlier, stopped command read.
+    keep_reading
+        Keep what was read when the transfer is whole: another transfer into DIR, with another rate, characteristic, smoother or
+        repair, then need not read again.
+    verify
+        Add up the files of what was read before, even if size and time of writing are the same.
+    follow
+        Play along while the capture is still being filmed (see `gramoscope film --live`): groups are played as they arrive,
+        with level, sharpness and stripes on the way, and warnings; the sound can be heard while it grows. The first groups are
+        what is learned from.
+    json_progress
+        Tell how far things are in lines of JSON, on standard error.
     quiet
         Say nothing.
     json
@@ -123,9 +153,11 @@ def play(
 
         return play_again(play, locals())
     from gramoscope.apparatus.opening import opened
+    from gramoscope.cli.watch import at_work
     from gramoscope.errors import ArgumentError
     from gramoscope.player.catalogue import Catalogue
     from gramoscope.player.devices import device_named
+    from gramoscope.player.following import follow as follow_film
     from gramoscope.player.play import Settings
     from gramoscope.player.play import play as play_capture
     from gramoscope.player.recipe import load_recipe, recipe_for, with_repairs
@@ -136,7 +168,8 @@ def play(
             f"{'CAPTURE' if capture is None else '--out'} requires an argument", "a capture and a folder"
         )
     terminal = Terminal(quiet, json)
-    played = opened(capture, picture.manifest(rpm))
+    following = follow_film(capture) if follow else None
+    played = opened(capture, picture.manifest(rpm)) if following is None else following.capture
     name = characteristic or played.bench.disc.characteristic or "riaa"
     catalogue = Catalogue(title=title, originator=originator, reference=reference, description=description)
     chosen = with_repairs(
@@ -157,8 +190,9 @@ def play(
         device=where,
         groove=groove,
     )
-    with terminal.progress("Playing") as progress:
-        report = play_capture(played, chosen, out, settings, progress=progress)
+    how = {"restart": restart, "keep_reading": keep_reading, "verify": verify, "following": following}
+    with at_work(terminal, out, executor, scheduler, workers, json_progress=json_progress, **how) as (progress, work):
+        report = play_capture(played, chosen, out, settings, progress=progress, work=work)
     terminal.result(report)
     tell(terminal, report, out)
     return FINE

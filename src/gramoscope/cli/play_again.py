@@ -10,7 +10,8 @@ from typing import Any
 from gramoscope.cli.terminal import FINE, Terminal
 from gramoscope.errors import require
 
-ALLOWED = ("capture", "out", "again", "force", "workers", "quiet", "json")
+HOW = ("restart", "keep_reading", "verify", "json_progress")
+ALLOWED = ("capture", "out", "again", "force", "workers", "executor", "scheduler", *HOW, "quiet", "json")
 """Options that say how, not what."""
 
 
@@ -25,6 +26,7 @@ def play_again(command: Callable[..., int], chosen: Mapping[str, Any]) -> int:
         Option → value; those that say what to do must be left as they are, for the report says it.
     """
     from gramoscope.cli.play import tell
+    from gramoscope.cli.watch import at_work
     from gramoscope.player.again import load_again
     from gramoscope.player.play import play
 
@@ -39,8 +41,9 @@ def play_again(command: Callable[..., int], chosen: Mapping[str, Any]) -> int:
     settings = again.settings(capture, chosen["workers"])
     for name, one in again.other_versions().items():
         terminal.say(f"[yellow]Note:[/] {name} was {one['then']} then, and is {one['now']} now")
-    with terminal.progress("Playing") as progress:
-        repeated = play(capture, again.recipe(), out, settings, progress=progress, judge=again.judged)
+    how = {name: chosen[name] for name in HOW}
+    with at_work(terminal, out, chosen["executor"], chosen["scheduler"], chosen["workers"], **how) as (progress, work):
+        repeated = play(capture, again.recipe(), out, settings, progress=progress, judge=again.judged, work=work)
     terminal.result(repeated)
     tell(terminal, repeated, out)
     _tell_sameness(terminal, repeated["again"])

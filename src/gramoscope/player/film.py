@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from gramoscope.apparatus.capture import Capture
 from gramoscope.pickup.cartridge import Pickup, Sketch
 from gramoscope.pickup.device import Device
 from gramoscope.pickup.processor import PROCESSOR
 from gramoscope.player.centring import Centring, surveyed
-from gramoscope.player.provenance import InputHashes, hash_group
+from gramoscope.player.kept_reading import KeptReading, Work, kept_reading_of
+from gramoscope.player.provenance import InputHashes
 from gramoscope.player.reading import Passage
 from gramoscope.player.recipe import Recipe
-from gramoscope.player.workers import in_order, spreading
+from gramoscope.player.workers import spreading
 from gramoscope.signal_path import WallTrace
 
 if TYPE_CHECKING:
@@ -32,18 +33,35 @@ class FilmReading:
 
     capture: Capture
     recipe: Recipe
-    pickup: Pickup
+    kept: KeptReading
     centring: Centring
     hashes: InputHashes
-    workers: int
     progress: Told | None = None
 
     @classmethod
-    def begun(cls, capture: Capture, recipe: Recipe, settings: Settings, progress: Told | None) -> FilmReading:
-        """Return a film as it is after learning its passage."""
-        pickup = learned(capture, recipe, settings.workers, device=settings.device, progress=progress)
-        centring = surveyed(capture, pickup, settings.workers, asked=settings.speed.remove_wow)
-        return cls(capture, recipe, pickup, centring, InputHashes(), settings.workers, progress)
+    @contextmanager
+    def begun(
+        cls, capture: Capture, recipe: Recipe, folder: Path, settings: Settings, work: Work, progress: Told | None
+    ) -> Iterator[FilmReading]:
+        """Give a film as it is after learning its passage, while the block runs; see `kept_reading`."""
+        workers, device = settings.workers, settings.device
+
+        def learn(noted: Capture) -> Pickup:
+            groups = None
+            if work.following is not None:
+                groups = work.following.learned_groups
+                work.following.wait(groups)
+            return learned(noted, recipe, workers, device=device, progress=progress, groups=groups)
+
+        how: dict[str, Any] = {"device": device, "workers": workers, "work": work, "learn": learn}
+        with kept_reading_of(capture, recipe, folder, **how) as kept:
+            centring = surveyed(capture, kept.pickup, workers, asked=settings.speed.remove_wow)
+            yield cls(capture, recipe, kept, centring, InputHashes(), progress)
+
+    @property
+    def pickup(self) -> Pickup:
+        """The cartridge that knows the passage."""
+        return self.kept.pickup
 
     @property
     def walls(self) -> tuple[str, ...]:
@@ -76,23 +94,18 @@ class FilmReading:
         return {}
 
     def remarks(self) -> Iterator[str]:
-        """Nothing."""
-        yield from ()
+        """Say how it was read, where that matters."""
+        yield from self.kept.remarks()
 
     def _picked_up(self, monitor: Monitor) -> Iterator[WallTrace]:
         """Read the stretches, several at a time."""
-        capture = self.capture
-
-        def read(number: int) -> tuple[WallTrace, dict[str, str], int]:
-            group = capture.group(number)
-            return self.pickup.read(group), hash_group(capture, number), int(np.count_nonzero(~group.valid))
-
-        for trace, sums, frames_lost in in_order(read, range(capture.group_count), workers=self.workers):
-            self.hashes.add(sums)
-            monitor.picked_up(trace, frames_lost)
+        for group in self.kept.groups():
+            self.hashes.add({file.name: file.sha256 for file in group.files})
+            monitor.picked_up(group.trace, group.frames_lost)
+            self.kept.work.watched(monitor, group.trace)
             if self.progress is not None:
-                self.progress(monitor.groups, capture.group_count, "Playing")
-            yield trace
+                self.progress(monitor.groups, self.capture.group_count, "Playing")
+            yield group.trace
 
     def _spliced(self, traces: Iterator[WallTrace], monitor: Monitor) -> Iterator[WallTrace]:
         for trace, match in self.recipe.splice.join(traces):
@@ -101,7 +114,13 @@ class FilmReading:
 
 
 def learned(
-    capture: Capture, recipe: Recipe, workers: int, *, device: Device = PROCESSOR, progress: Told | None = None
+    capture: Capture,
+    recipe: Recipe,
+    workers: int,
+    *,
+    device: Device = PROCESSOR,
+    progress: Told | None = None,
+    groups: int | None = None,
 ) -> Pickup:
     """Return the recipe's cartridge, fitted to a capture, as it is after learning the passage.
 
@@ -114,6 +133,8 @@ def learned(
         On which it will read.
     progress : callable, optional
         Told how much is done, of how much, and of what.
+    groups : int, optional
+        Learn from the first so many only.
     """
     with spreading(workers) as spread:
         cartridge = recipe.cartridge_for(capture.bench, device)
@@ -122,4 +143,4 @@ def learned(
             if progress is not None:
                 progress(done, total, "Learning")
 
-        return cartridge.learn(capture.group, capture.group_count, spread, told)
+        return cartridge.learn(capture.group, groups or capture.group_count, spread, told)

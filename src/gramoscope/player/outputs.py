@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -18,14 +19,25 @@ from gramoscope.listening.report import json_text
 from gramoscope.listening.whole_file import create_temporary, put_in_place, temporary_sibling, written_whole
 from gramoscope.player.cue_list import CUES, LABELS, CueList
 from gramoscope.player.track_file import TrackFile, files_of
-from gramoscope.player.tracks import REPAIR_TRACKS, Track
+from gramoscope.player.tracks import EQUALISED, FLAT, REPAIR_TRACKS, VERTICAL, WALLS, Track
 from gramoscope.signal_path import Audio
 
 REPORT, PAGE, PICTURE = "report.json", "report.html", "groove.png"
+_STEMS = {Path(name).stem for name in (REPORT, PAGE, PICTURE, CUES, LABELS)} | {
+    Path(track.name).stem for track in (FLAT, WALLS, VERTICAL, EQUALISED, *REPAIR_TRACKS)
+}
 GROOVES, EDGES, GROOVE_LABELS = "grooves.csv", "edges.npz", "grooves.txt"
 BESIDE = (GROOVES, EDGES, GROOVE_LABELS)
 """Files that only the photographs of grooves have beside their sound."""
 Piece = TypeVar("Piece")
+
+
+def remove_left_over(folder: Path) -> None:
+    """Remove the temporary files of transfers into a folder that were killed; only while nobody else works there."""
+    for path in folder.glob(".*.part"):
+        maker = path.suffixes[-2:-1]
+        if path.name.split(".")[1] in _STEMS and maker != [f".{os.getpid()}"]:
+            path.unlink(missing_ok=True)
 
 
 class Outputs:

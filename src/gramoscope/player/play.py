@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
@@ -26,6 +27,7 @@ from gramoscope.pickup.processor import PROCESSOR
 from gramoscope.player.catalogue import Catalogue, metadata_of
 from gramoscope.player.film import FilmReading
 from gramoscope.player.hints import Hints
+from gramoscope.player.kept_reading import Work
 from gramoscope.player.monitor import OVERVIEW_POINTS, Monitor
 from gramoscope.player.outputs import Outputs
 from gramoscope.player.picture import groove_picture, worst_places
@@ -131,6 +133,7 @@ def play(
     *,
     progress: Progress | None = None,
     judge: Callable[[Mapping[str, Any]], Mapping[str, Any]] | None = None,
+    work: Work | None = None,
 ) -> dict[str, Any]:
     """Turn a capture into sound files, a report and a picture.
 
@@ -145,6 +148,9 @@ def play(
         Told how much is done, of how much, and of what ("Learning", "Playing").
     judge : callable, optional
         Given the report before anything is put in place; returns what to add to it, or raises (`player.again`).
+    work : Work, optional
+        Of a film: who reads, and what becomes of what was read before (`player.kept_reading`); the result does not depend on
+        it.
 
     Returns
     -------
@@ -156,15 +162,18 @@ def play(
     CaptureError
         If the groove was not seen anywhere.
     OutputError
-        If something cannot be written. Whatever is raised, no half-written file stays.
+        If something cannot be written. Whatever is raised, no half-written file stays, but what was read of a film is kept:
+        the same call goes on from there.
     """
     started = time.perf_counter()
     bench, direction = capture.bench, direction_of_cut(capture.bench.disc.cut)
     equaliser = Equaliser(characteristic(settings.characteristic_name))
     resampler = Resampler(settings.speed.rotation_of(bench.rotation), settings.rate_hz, recipe.passband)
 
-    with _outputs(capture, recipe, folder, settings) as files:
-        reading = _begun(capture, recipe, settings, files, progress)
+    with (
+        _outputs(capture, recipe, folder, settings) as files,
+        _begun(capture, recipe, folder, settings, files, work or Work(), progress) as reading,
+    ):
         tonearm = Tonearm(resampler.rotation, direction, bench.disc.wall_angle_rad, reading.length_m, recipe.smoother)
         monitor = _monitor(capture, tonearm, resampler)
 
@@ -189,13 +198,19 @@ def play(
 
 
 def _begun(
-    capture: AnyCapture, recipe: Recipe, settings: Settings, files: Outputs, progress: Progress | None
-) -> Reading:
-    """Return a capture as it is after what must be known of the whole of it was found out."""
+    capture: AnyCapture,
+    recipe: Recipe,
+    folder: Path,
+    settings: Settings,
+    files: Outputs,
+    work: Work,
+    progress: Progress | None,
+) -> AbstractContextManager[Reading]:
+    """Give a capture as it is after what must be known of the whole of it was found out."""
     if isinstance(capture, StillCapture):
-        return StillReading.begun(capture, recipe, settings, files, progress)
+        return nullcontext(StillReading.begun(capture, recipe, settings, files, progress))
     require(settings.groove is None, f"groove {settings.groove} of a film", "photographs", "leave --groove out")
-    return FilmReading.begun(capture, recipe, settings, progress)
+    return FilmReading.begun(capture, recipe, folder, settings, work, progress)
 
 
 def _heard(pieces: Iterator[Audio], monitor: Monitor) -> Iterator[Audio]:

@@ -12,6 +12,7 @@ from typing import Any
 
 from gramoscope.errors import TransferError
 from gramoscope.player.outputs import REPORT
+from gramoscope.player.reading_store import STORE
 from gramoscope.player.report import REPORT_FORMAT
 from gramoscope.player.track_file import sum_beside
 
@@ -175,6 +176,8 @@ def _everything(folder: Path) -> Iterator[tuple[str, Path]]:
     """All files, by their names from the folder."""
     for path in folder.rglob("*"):
         name = path.relative_to(folder).as_posix()
+        if name.split("/")[0] == STORE:
+            continue  # what was kept for another transfer is no part of this one
         if path.is_symlink() or not (path.is_dir() or path.is_file()):
             raise TransferError(
                 f"{path} is no plain file",

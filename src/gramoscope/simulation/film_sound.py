@@ -62,6 +62,7 @@ def film_sound(
     *,
     compress: bool = False,
     overwrite: bool = False,
+    live: bool = False,
     workers: int = 2,
     progress: Callable[[int, int], None] | None = None,
 ) -> Passage:
@@ -74,7 +75,7 @@ def film_sound(
     rate_hz : float
     scene : Scene
         Its disc names the recording characteristic, flat if it names none; its number of groups is not looked at.
-    folder, layout, compress, overwrite
+    folder, layout, compress, overwrite, live
         As in `CaptureWriter`.
     workers : int
         Groups rendered at the same time.
@@ -95,7 +96,7 @@ def film_sound(
     scene = scene.lasting(len(samples) / rate_hz)
     # a video cannot leave a group out
     lost: Literal["leave out", "black"] = "black" if layout == "video" else "leave out"
-    with CaptureWriter(folder, scene.bench, layout=layout, compress=compress, overwrite=overwrite) as writer:
+    with CaptureWriter(folder, scene.bench, layout=layout, compress=compress, overwrite=overwrite, live=live) as writer:
         passage = film(cut, rate_hz, scene, writer, workers=workers, lost=lost, progress=progress)
     save_truth(folder, scene, passage)
     return passage
