@@ -141,7 +141,7 @@ def test_a_removal_puts_the_stretches_of_a_transfer_where_the_groove_has_them(
                 asked.append(trace.number)
                 yield trace
 
-    monkeypatch.setattr("gramoscope.player.play.surveyed", lambda *_, asked: _Noting(asked))
+    monkeypatch.setattr("gramoscope.player.film.surveyed", lambda *_, asked: _Noting(asked))
     same = played(capture, tmp_path / "out")
     assert asked == list(range(8)), "every stretch passes by, once and in order"
     assert same.bits("flat.wav") == transfer.bits("flat.wav")

@@ -124,6 +124,17 @@ def test_chunks_of_nothing_but_negative_zeros_come_back_as_such(store: ReadingSt
     assert all(_same(trace, one.trace) for one in found.groups)
 
 
+def test_a_group_of_which_nothing_was_seen_comes_back_whatever_its_nans_are(store: ReadingStore) -> None:
+    """A difference of NaNs has a sign on some processors."""
+    trace = _trace(np.random.default_rng(5), 0, 9, None)
+    nothing = np.full((2, 9), -np.nan)
+    blind = replace(trace, offset_m=nothing, offset_sigma_m=nothing, slope=nothing, slope_sigma=nothing)
+    store.write(0, Piece((GroupReading(blind),) * len(store.groups_of(0))))
+    read = store.read(0)
+    assert read is not None
+    assert np.isnan(read.groups[0].trace.offset_m).all()
+
+
 def test_what_an_earlier_reading_left_behind_is_not_taken_for_this_one(store: ReadingStore) -> None:
     rng = np.random.default_rng(5)
     late = replace(store, manifest={"a": "another"})

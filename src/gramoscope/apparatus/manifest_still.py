@@ -18,7 +18,7 @@ from gramoscope.apparatus.still_tables import StillFile
 from gramoscope.camera.pattern import IMAGE_SUFFIXES, require_inside
 from gramoscope.conventions import Columns, Rows
 from gramoscope.disc.formats import Disc
-from gramoscope.errors import ArgumentError, ManifestError
+from gramoscope.errors import ArgumentError, GramoscopeError, ManifestError
 
 KIND = "still"
 
@@ -62,7 +62,7 @@ def is_still(path: Path) -> bool:
     file = path / MANIFEST_NAME if path.is_dir() else path
     try:
         sequence = load_toml(file).get("sequence")
-    except Exception:  # said by whoever reads it as a film
+    except (GramoscopeError, OSError):  # said by whoever reads it as a film
         return False
     return isinstance(sequence, dict) and sequence.get("kind") == KIND
 

@@ -318,6 +318,9 @@ def _arrays_of(traces: Sequence[WallTrace]) -> dict[str, Any]:
         for k, end in enumerate((trace.head, trace.tail)):
             if end is not None:
                 arrays["strips"][i, k, : end.strip.shape[0], : end.strip.shape[1]] = end.strip
+    # there are many NaNs, with a sign for instance; a chunk of nothing else comes back as the one it is filled with
+    for name in ("walls", "places"):
+        arrays[name][np.isnan(arrays[name])] = np.nan
     return arrays
 
 
