@@ -192,17 +192,6 @@ def test_there_is_no_groove_in_noise(picture_of: Make) -> None:
     assert CARTRIDGE.find(picture_of(np.full((300, 400), 255, np.uint8))) == ()
 
 
-def test_a_sketch_shows_a_line_for_each_edge(photograph: Make, picture_of: Make) -> None:
-    picture = photograph().still()
-    cut = picture_of(picture.image[50:].copy())
-    sketch = CARTRIDGE.sketch(cut, CARTRIDGE.find(cut))
-    assert sketch.image is cut.image
-    assert [line.name for line in sketch.lines] == [
-        "groove 0, inner wall",
-        *(f"groove {n}, {wall} wall" for n in (1, 2) for wall in ("outer", "inner")),
-    ]
-
-
 @pytest.mark.parametrize("wrong", [{"steepest": 0.0}, {"burnt_share": 0.0}, {"least_seen": 2.0}])
 def test_impossible_parameters_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ArgumentError):

@@ -13,7 +13,6 @@ import numpy as np
 
 from gramoscope.conventions import INNER, OUTER
 from gramoscope.errors import require
-from gramoscope.pickup.cartridge import Line, Sketch
 from gramoscope.pickup.edges.appearance import Appearance
 from gramoscope.pickup.edges.courses import Course, find_courses
 from gramoscope.pickup.edges.groove_choice import CoarseGroove, choose_grooves
@@ -132,16 +131,6 @@ class EdgeCartridge:
             return edge
 
         return sharp(groove.inner), sharp(groove.outer)
-
-    def sketch(self, picture: StillPicture, grooves: tuple[GrooveEdges, ...]) -> Sketch:
-        """Return the picture and a line for each edge that was found in it."""
-        lines = []
-        for groove in grooves:
-            for wall, name in ((OUTER, "outer"), (INNER, "inner")):
-                measured = (groove.flags[wall] & np.uint16(NOT_MEASURED)) == 0
-                if measured.any():
-                    lines.append(Line(f"groove {groove.number}, {name} wall", groove.row_px[wall], measured))
-        return Sketch(picture.image, tuple(lines))
 
 
 def _edge_count(grooves: list[CoarseGroove]) -> int:
