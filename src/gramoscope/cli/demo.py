@@ -80,7 +80,8 @@ def demo(
     save_png(comparison_figure(original_there, copy_there, found.rate_hz, found), out / "comparison.png")
     terminal.say(
         f"\nLook at {played / 'report.html'}, {played / 'groove.png'} and {out / 'comparison.png'}; "
-        f"listen to {out / 'original.wav'} and {played / 'flat.wav'}.\nYour own sound: gramoscope film SOUND CAPTURE, then gramoscope play CAPTURE --out DIR"
+        f"listen to {out / 'original.wav'} and {played / 'flat.wav'}.\n"
+        "Your own sound: gramoscope film SOUND CAPTURE, then gramoscope play CAPTURE --out DIR"
     )
     return FINE
 
