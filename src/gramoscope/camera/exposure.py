@@ -9,6 +9,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from gramoscope.conventions import BoolArray, FloatArray
 from gramoscope.quality import Quality
 from gramoscope.signal_path import FrameGroup
 
@@ -19,22 +20,33 @@ EVERY_ROW = 17
 """Of so many rows one is looked at, which tells enough."""
 
 
+@numba.njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
+def _sums(row, white_level):  # type: ignore[no-untyped-def]
+    """Sum and sum of squares of the pixels of a row, and how many are at full scale."""
+    total, square, full = np.float32(0), np.float32(0), np.uint32(0)
+    for x in range(row.size):
+        value = np.float32(row[x])
+        total += value
+        square += value * value
+        full += np.uint32(value >= white_level)
+    return total, square, full
+
+
 @numba.njit(cache=True, nogil=True)
-def _levels(frame, white_level):  # type: ignore[no-untyped-def]
-    """Mean and standard deviation of the pixels, and the share of those at full scale."""
-    total, square, full = 0.0, 0.0, 0
-    for row in frame:
-        row_total, row_square, row_full = np.int64(0), np.int64(0), 0
-        for x in range(row.size):
-            value = np.int64(row[x])
-            row_total += value
-            row_square += value * value
-            row_full += value >= white_level
-        total += row_total
-        square += row_square
-        full += row_full
-    mean = total / frame.size
-    return mean, np.sqrt(max(square / frame.size - mean * mean, 0.0)), full / frame.size
+def _levels(frames, every, white_level):  # type: ignore[no-untyped-def]
+    """Mean and standard deviation of the pixels of each frame, and the share of those at full scale, in some of its rows."""
+    levels = np.empty((len(frames), 3))
+    for k in range(len(frames)):
+        total, square, full, pixels = 0.0, 0.0, 0, 0
+        for y in range(0, frames.shape[1], every):
+            row_total, row_square, row_full = _sums(frames[k, y], np.float32(white_level))
+            total += row_total
+            square += row_square
+            full += row_full
+            pixels += frames.shape[2]
+        mean = total / pixels
+        levels[k] = mean, np.sqrt(max(square / pixels - mean * mean, 0.0)), full / pixels
+    return levels
 
 
 @dataclass(frozen=True)
@@ -55,15 +67,12 @@ class Exposure:
 
     def is_dark(self, frame: Frame, *, white_level: int) -> bool:
         """Tell whether a frame, shape (row, column), shows no light or no contrast."""
-        mean, contrast, _ = _levels(frame, white_level)
-        return self._dark(mean, contrast, white_level)
+        mean, contrast, _ = _levels(frame[np.newaxis], 1, white_level).T
+        return bool(self._dark(mean, contrast, white_level)[0])
 
     def is_saturated(self, frame: Frame, *, white_level: int) -> bool:
         """Tell whether too much of a frame, shape (row, column), is at full scale."""
-        return bool(_levels(frame, white_level)[2] > self.saturated_share)
-
-    def _dark(self, mean: float, contrast: float, white_level: int) -> bool:
-        return bool(mean < self.least_mean * white_level or contrast < self.least_contrast * white_level)
+        return bool(_levels(frame[np.newaxis], 1, white_level)[0, 2] > self.saturated_share)
 
     def sort_out(self, group: FrameGroup) -> tuple[FrameGroup, Quality]:
         """Return the group without its useless frames, and why they are useless.
@@ -78,18 +87,22 @@ class Exposure:
         valid = group.valid.copy()
         flags = Quality(0) if valid.all() else Quality.FRAME_LOST
         problems = list(group.problems)
-        for k in np.flatnonzero(valid):
-            flag, reason = self._fault(group.images[k, ::EVERY_ROW], group.white_level)
-            if flag:
-                valid[k] = False
-                flags |= flag
-                problems.append(f"group {group.number}, frame {k}: {reason}")
+        levels = _levels(group.images, EVERY_ROW, group.white_level)
+        for k in np.flatnonzero(valid & self._faulty(levels, group.white_level)):
+            flag, reason = self._fault(levels[k])
+            valid[k] = False
+            flags |= flag
+            problems.append(f"group {group.number}, frame {k}: {reason}")
         return dataclasses.replace(group, valid=valid, problems=tuple(problems)), flags
 
-    def _fault(self, frame: Frame, white_level: int) -> tuple[Quality, str]:
-        mean, contrast, full = _levels(frame, white_level)
-        if full > self.saturated_share:
+    def _faulty(self, levels: FloatArray, white_level: int) -> BoolArray:
+        mean, contrast, full = levels.T
+        return np.asarray((full > self.saturated_share) | self._dark(mean, contrast, white_level))
+
+    def _dark(self, mean: FloatArray, contrast: FloatArray, white_level: int) -> BoolArray:
+        return np.asarray((mean < self.least_mean * white_level) | (contrast < self.least_contrast * white_level))
+
+    def _fault(self, levels: FloatArray) -> tuple[Quality, str]:
+        if levels[2] > self.saturated_share:
             return Quality.SATURATED, f"too bright, more than {self.saturated_share:.0%} at full scale"
-        if self._dark(mean, contrast, white_level):
-            return Quality.DARK, "no light or no contrast"
-        return Quality(0), ""
+        return Quality.DARK, "no light or no contrast"

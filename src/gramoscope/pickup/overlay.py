@@ -246,7 +246,7 @@ def sum_type(images: ImageArray) -> type[np.uint16] | type[np.uint32]:
     return np.uint16 if small else np.uint32
 
 
-PHASES = 8
+PHASES = 4
 """Frames lie over each other to an eighth of a pixel: at most so many sums of frames are interpolated, in place of all frames.
 At a third of a cycle a pixel that costs 0.3 % of the texture's amplitude."""
 

@@ -17,7 +17,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numba
 import numpy as np
@@ -188,11 +187,14 @@ def _row_texture(before, after):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _texture_of_rows(image):  # type: ignore[no-untyped-def]
-    out = np.empty(image.shape[0])
-    for row in range(image.shape[0]):
-        out[row] = _row_texture(image[row, :-4], image[row, 4:])
-    return out
+def _textured_rows(image, share, most):  # type: ignore[no-untyped-def]
+    power = np.empty(image.shape[0])
+    for row in range(power.size):
+        power[row] = _row_texture(image[row, :-4], image[row, 4:])
+    power -= np.quantile(power, 0.25)
+    largest = power.max()
+    rows = np.flatnonzero(power >= share * largest) if largest > 0 else np.arange(power.size)
+    return rows[:: -(-rows.size // most)]
 
 
 @numba.njit(cache=True, nogil=True)
@@ -244,16 +246,40 @@ def _shift_correction(here, there, rows, shift_px):  # type: ignore[no-untyped-d
     return 6.0 * cross / square if square > 0 else 0.0
 
 
-def textured_rows(
-    image: npt.NDArray[np.uint8] | npt.NDArray[np.uint16], *, share: float = 0.25
-) -> npt.NDArray[np.int64]:
-    """Return the rows whose gradients along the groove hold at least `share` of the strongest row's power.
+@numba.njit(cache=True, nogil=True)
+def _pair_shift(here, there, rows, expected_px, reach_px, rounds):  # type: ignore[no-untyped-def]
+    shift_px = expected_px
+    for _ in range(rounds):
+        step = min(max(_shift_correction(here, there, rows, shift_px), -LARGEST_STEP_PX), LARGEST_STEP_PX)
+        shift_px += step
+        if not abs(shift_px - expected_px) <= reach_px or shift_px < 0:
+            return np.nan
+        if abs(step) < CONVERGED_PX:
+            return shift_px
+    return np.nan
+
+
+@numba.njit(cache=True, nogil=True)
+def _pair_shifts(images, index, expected_px, share):  # type: ignore[no-untyped-def]
+    found_px = np.empty(expected_px.size)
+    rows = _textured_rows(images[index[0]], share, ENOUGH_ROWS)
+    for i in range(found_px.size):
+        found_px[i] = _pair_shift(images[index[i]], images[index[i + 1]], rows, expected_px[i], REACH_PX, ROUNDS)
+    return found_px
+
+
+TEXTURED = 0.25
+"""Rows with less power than this, of the strongest row's, carry no texture."""
+ENOUGH_ROWS = 32
+"""So many rows that carry texture say where a frame lies to a hundredth of a pixel; more are not looked at."""
+
+
+def textured_rows(image: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> npt.NDArray[np.int64]:
+    """Return rows whose gradients along the groove are strong: enough of them, spread evenly over all.
 
     The power that every row has (camera noise) is taken off first, as the lower quartile over the rows.
     """
-    power = _texture_of_rows(image)
-    power = np.maximum(power - np.quantile(power, 0.25), 0.0)
-    return np.flatnonzero(power >= share * power.max()) if power.max() > 0 else np.arange(image.shape[0])
+    return np.asarray(_textured_rows(image, TEXTURED, ENOUGH_ROWS))
 
 
 def pair_shift_px(
@@ -287,15 +313,7 @@ def pair_shift_px(
     float
         d in pixels; NaN when the search does not converge within `reach_px`.
     """
-    shift = expected_px
-    for _ in range(rounds):
-        step = float(np.clip(_shift_correction(here, there, rows, shift), -LARGEST_STEP_PX, LARGEST_STEP_PX))
-        shift += step
-        if not abs(shift - expected_px) <= reach_px or shift < 0:
-            return float("nan")
-        if abs(step) < CONVERGED_PX:
-            return shift
-    return float("nan")
+    return float(_pair_shift(here, there, rows, float(expected_px), reach_px, rounds))
 
 
 def frame_shifts(group: FrameGroup) -> tuple[FloatArray, FloatArray]:
@@ -314,14 +332,10 @@ def frame_shifts(group: FrameGroup) -> tuple[FloatArray, FloatArray]:
         From frame to frame; NaN beside a frame that is not valid and where the flow could not be found (there the
         nominal step is used in `shift_px`).
     """
-    index = np.flatnonzero(group.valid)
-    rows = textured_rows(group.images[index[0]])
     expected_px = expected_steps_px(group)
-    found_px = [
-        pair_shift_px(group.images[a], group.images[b], expected_px=expected, rows=rows)
-        for (a, b), expected in zip(pairwise(index), expected_px.tolist(), strict=True)
-    ]
-    return added_up(group, expected_px, np.array(found_px))
+    return added_up(
+        group, expected_px, _pair_shifts(group.images, np.flatnonzero(group.valid), expected_px, TEXTURED)
+    )
 
 
 def expected_steps_px(group: FrameGroup) -> FloatArray:

@@ -121,14 +121,12 @@ def sharpness_of(energy: Float32Array, *, ceiling: float = CEILING) -> Float32Ar
     _smooth(energy, sharp)
     # a row is quiet all along the stretch, or it is not
     some = np.sort(sharp[::EVERY], axis=0)
-    noise = np.float32(np.quantile(0.5 * (some[(len(some) - 1) // 2] + some[len(some) // 2]), 0.1))
-    peak = np.empty(len(sharp), np.float32)
-    _amplitudes(sharp, noise, peak)
-    reference = np.float32(np.median(peak))
-    _limit(sharp, np.float32(1 / reference) if reference > 0 else np.float32(0), np.float32(ceiling))
+    _relate(sharp, 0.5 * (some[(len(some) - 1) // 2] + some[len(some) // 2]), np.float32(ceiling))
     return sharp
 
 
+QUIETEST = 0.1
+"""A tenth of the rows are quieter than where nothing is sharp."""
 EVERY = 8
 """Of so many cells one is looked at to find out how quiet the quietest rows are."""
 
@@ -158,18 +156,23 @@ def _root_above(values, noise):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _amplitudes(sharp, noise, peak):  # type: ignore[no-untyped-def]
-    """Turn energies into amplitudes above the noise, and find each cell's largest."""
-    for cell in range(len(sharp)):
-        _root_above(sharp[cell], noise)
-        peak[cell] = sharp[cell].max()
+def _limit(cell, gain, ceiling):  # type: ignore[no-untyped-def]
+    for row in range(cell.size):
+        cell[row] = min(cell[row] * gain, ceiling)
 
 
 @numba.njit(cache=True, nogil=True)
-def _limit(sharp, gain, ceiling):  # type: ignore[no-untyped-def]
-    for cell in sharp:
-        for row in range(cell.size):
-            cell[row] = min(cell[row] * gain, ceiling)
+def _relate(sharp, usual, ceiling):  # type: ignore[no-untyped-def]
+    """Turn energies into amplitudes above the noise, of rows that usually have so much, in units of a typical cell's largest."""
+    noise = np.float32(np.quantile(usual, QUIETEST))
+    peak = np.empty(len(sharp), np.float32)
+    for cell in range(len(sharp)):
+        _root_above(sharp[cell], noise)
+        peak[cell] = sharp[cell].max()
+    reference = np.median(peak)
+    gain = np.float32(1 / reference) if reference > 0 else np.float32(0)
+    for cell in range(len(sharp)):
+        _limit(sharp[cell], gain, ceiling)
 
 
 @numba.njit(cache=True, nogil=True)
