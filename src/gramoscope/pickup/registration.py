@@ -333,9 +333,7 @@ def frame_shifts(group: FrameGroup) -> tuple[FloatArray, FloatArray]:
         nominal step is used in `shift_px`).
     """
     expected_px = expected_steps_px(group)
-    return added_up(
-        group, expected_px, _pair_shifts(group.images, np.flatnonzero(group.valid), expected_px, TEXTURED)
-    )
+    return added_up(group, expected_px, _pair_shifts(group.images, np.flatnonzero(group.valid), expected_px, TEXTURED))
 
 
 def expected_steps_px(group: FrameGroup) -> FloatArray:

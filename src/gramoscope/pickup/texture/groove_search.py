@@ -21,87 +21,143 @@ from gramoscope.pickup.texture.layout import BOTTOM_PX, StripeLayout, wall_sign
 from gramoscope.pickup.texture.sharpness import ridges
 
 
-@numba.njit(cache=True, nogil=True)
-def _raise(from_, cost, top):  # type: ignore[no-untyped-def]
-    for j in range(top.size):
-        top[j] = max(top[j], from_[j] - cost)
+# Places are unsigned, for signed ones may count from the end, and keep loops from being vectorised; arrays are lines, for
+# taking part of one costs as much as the work on it.
 
 
 @numba.njit(cache=True, nogil=True)
-def _add(values, total):  # type: ignore[no-untyped-def]
-    for j in range(total.size):
-        total[j] += values[j]
+def _copy(values, first, size, out, begin):  # type: ignore[no-untyped-def]
+    here, there = np.uint64(first), np.uint64(begin)
+    for k in range(np.uint64(size)):
+        out[there + k] = values[here + k]
 
 
 @numba.njit(cache=True, nogil=True)
-def best_path(score, largest_step, step_cost):  # type: ignore[no-untyped-def]
-    """Return the path through score[cell, i, j] with the largest sum, and that sum (A. Viterbi, 1967).
+def _add(values, size, out, begin):  # type: ignore[no-untyped-def]
+    there = np.uint64(begin)
+    for k in range(np.uint64(size)):
+        out[there + k] += values[k]
 
-    Quickest where the last axis is the long one. Scores are overwritten by the largest sums of paths that end there: what
-    came before a place is found again on the way back.
-    From cell to cell i and j change by at most `largest_step[0]` and `[1]`, each at a cost of its `step_cost` times the
-    square of the change; as these add up, the best step in j is found first and that in i after it.
-    """
-    cells, rows, columns = score.shape
-    reach_i, reach_j = largest_step[0], largest_step[1]
-    real = score.dtype.type
-    along, new = np.empty((rows, columns), score.dtype), np.empty(columns, score.dtype)
-    for cell in range(1, cells):
-        for i in range(rows):
-            along[i] = score[cell - 1, i]
-            for step in range(1, reach_j + 1):
-                cost = real(step_cost[1] * step * step)
-                _raise(score[cell - 1, i, step:], cost, along[i, : columns - step])
-                _raise(score[cell - 1, i, : columns - step], cost, along[i, step:])
-        for i in range(rows):
-            new[:] = along[i]
-            for step in range(1, reach_i + 1):
-                cost = real(step_cost[0] * step * step)
-                if i + step < rows:
-                    _raise(along[i + step], cost, new)
-                if i - step >= 0:
-                    _raise(along[i - step], cost, new)
-            _add(new, score[cell, i])
+
+@numba.njit(cache=True, nogil=True)
+def _raise(sums, begin, far, price, best, first, size):  # type: ignore[no-untyped-def]
+    """Raise some of the best sums to those so far away, on either side, at a price."""
+    here, before, behind = np.uint64(first), np.uint64(begin - far), np.uint64(begin + far)
+    for k in range(np.uint64(size)):
+        best[here + k] = max(best[here + k], max(sums[before + k], sums[behind + k]) - price)
+
+
+@numba.njit(cache=True, nogil=True)
+def _raise_by_steps(sums, begin, far, count, cost, best, first, size):  # type: ignore[no-untyped-def]
+    """Raise some of the best sums to those up to `count` steps of `far` places away, each at the cost of its square."""
+    for step in range(1, count + 1):
+        _raise(sums, begin, step * far, best.dtype.type(cost * step * step), best, first, size)
+
+
+@numba.njit(cache=True, nogil=True)
+def _go_on(sums, begin, line, size, reach, cost, along, new):  # type: ignore[no-untyped-def]
+    """Add the best sums of one cell, which begin at a place, to the scores of the next."""
+    margin = reach[0] * line
+    _copy(sums, begin, size, along, margin)
+    _raise_by_steps(sums, begin, 1, reach[1], cost[1], along, margin, size)
+    _copy(along, margin, size, new, 0)
+    _raise_by_steps(along, margin, line, reach[0], cost[0], new, 0, size)
+    _add(new, size, sums, begin + size)
+
+
+@numba.njit(cache=True, nogil=True)
+def _way_back(sums, begin, shape, line, reach, cost):  # type: ignore[no-untyped-def]
+    """Return the path that ends where the sum is largest, and that sum."""
+    cells, rows, columns = shape
+    size = rows * line
     path = np.empty((2, cells), np.int64)
-    end = np.argmax(score[cells - 1])
-    i, j = end // columns, end % columns
-    total = score[cells - 1, i, j]
+    end = begin + (cells - 1) * size
+    best = end + np.argmax(sums[end : end + size])
+    total, i, j = sums[best], (best - end) // line, (best - end) % line
     path[0, -1], path[1, -1] = i, j
     for cell in range(cells - 1, 0, -1):
-        best, from_i, from_j = -np.inf, i, j
-        for m in range(max(0, i - reach_i), min(rows, i + reach_i + 1)):
-            for n in range(max(0, j - reach_j), min(columns, j + reach_j + 1)):
-                value = score[cell - 1, m, n] - step_cost[0] * (m - i) ** 2 - step_cost[1] * (n - j) ** 2
-                if value > best:
-                    best, from_i, from_j = value, m, n
+        most, from_i, from_j = -np.inf, i, j
+        for m in range(max(0, i - reach[0]), min(rows, i + reach[0] + 1)):
+            for n in range(max(0, j - reach[1]), min(columns, j + reach[1] + 1)):
+                value = (
+                    sums[begin + ((cell - 1) * rows + m) * line + n] - cost[0] * (m - i) ** 2 - cost[1] * (n - j) ** 2
+                )
+                if value > most:
+                    most, from_i, from_j = value, m, n
         i, j = from_i, from_j
         path[0, cell - 1], path[1, cell - 1] = i, j
     return path, total
 
 
 @numba.njit(cache=True, nogil=True)
-def _add_above(values, level, total):  # type: ignore[no-untyped-def]
-    for k in range(total.size):
-        total[k] += values[k] - level
+def _room(shape, reach, real):  # type: ignore[no-untyped-def]
+    """What paths through so many cells, rows and columns add up in, with a margin after each row that no path enters."""
+    cells, rows, columns = shape
+    line = columns + reach[1]
+    sums = np.empty(reach[1] + cells * rows * line, real)
+    sums[: reach[1]] = -np.inf
+    along = np.full((rows + 2 * reach[0]) * line, -np.inf, real)
+    return line, sums, along, np.empty(rows * line, real)
 
 
 @numba.njit(cache=True, nogil=True)
-def _add_stripe(coarse, first_row, seen_rows, absent, score):  # type: ignore[no-untyped-def]
-    """Add a stripe to the scores of displacements whose first one puts it into `first_row`, for each vertical one.
+def best_path(score, largest_step, step_cost):  # type: ignore[no-untyped-def]
+    """Return the path through score[cell, i, j] with the largest sum, and that sum (A. Viterbi, 1967).
 
-    coarse[row % GRID_PX, cell] holds every third row, so that neighbouring displacements lie side by side.
+    From cell to cell i and j change by at most `largest_step[0]` and `[1]`, each at a cost of its `step_cost` times the
+    square of the change; as these add up, the best step in j is found first and that in i after it. What came before a
+    place is found again on the way back.
     """
-    cells, verticals, laterals = score.shape
-    for v in range(verticals):
-        low, high = seen_rows[v]
-        start = max(0, -((first_row[v] - low) // GRID_PX))
-        stop = min(laterals, (high - first_row[v]) // GRID_PX + 1)
-        if stop <= start:
-            continue
-        row = first_row[v] + GRID_PX * start
-        at = row // GRID_PX
-        for cell in range(cells):
-            _add_above(coarse[row % GRID_PX, cell, at : at + stop - start], absent, score[cell, v, start:stop])
+    cells, rows, columns = score.shape
+    line, sums, along, new = _room(score.shape, largest_step, score.dtype)
+    size, begin = rows * line, largest_step[1]
+    for cell in range(cells):
+        for i in range(rows):
+            first = begin + cell * size + i * line
+            sums[first : first + columns] = score[cell, i]
+            sums[first + columns : first + line] = -np.inf
+        if cell > 0:
+            _go_on(sums, begin + (cell - 1) * size, line, size, largest_step, step_cost, along, new)
+    return _way_back(sums, begin, score.shape, line, largest_step, step_cost)
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_above(values, first, level, begin, count, sums):  # type: ignore[no-untyped-def]
+    here, there = np.uint64(first), np.uint64(begin)
+    for k in range(np.uint64(count)):
+        sums[there + k] += values[here + k] - level
+
+
+@numba.njit(cache=True, nogil=True)
+def _common_path(coarse, swing, first_row, seen_rows, absent, largest_step, step_cost):  # type: ignore[no-untyped-def]
+    """Return the best path through the sums of all stripes, cell by cell.
+
+    coarse[row % GRID_PX, cell, row // GRID_PX] holds every third row, so that neighbouring displacements lie side by side;
+    swing[v, k] is what displacements cost; stripe i of a groove with vertical displacement v and the first lateral one lies in
+    row first_row[i, v], and is seen in rows from seen_rows[i, v, 0] to seen_rows[i, v, 1].
+    """
+    _, cells, thirds = coarse.shape
+    verticals, laterals = swing.shape
+    shape = (cells, verticals, laterals)
+    line, sums, along, new = _room(shape, largest_step, coarse.dtype)
+    usual = np.full((verticals, line), -np.inf, coarse.dtype)
+    usual[:, :laterals] = -swing
+    costs, ridges_, size = usual.reshape(usual.size), coarse.reshape(coarse.size), verticals * line
+    for cell in range(cells):
+        begin = largest_step[1] + cell * size
+        _copy(costs, 0, size, sums, begin)
+        for i in range(len(first_row)):
+            for v in range(verticals):
+                low, high = seen_rows[i, v]
+                start = max(0, -((first_row[i, v] - low) // GRID_PX))
+                count = min(laterals, (high - first_row[i, v]) // GRID_PX + 1) - start
+                row = first_row[i, v] + GRID_PX * start
+                if count > 0:
+                    there = ((row % GRID_PX) * cells + cell) * thirds + row // GRID_PX
+                    _add_above(ridges_, there, absent, begin + v * line + start, count, sums)
+        if cell > 0:
+            _go_on(sums, begin - size, line, size, largest_step, step_cost, along, new)
+    return _way_back(sums, largest_step[1], shape, line, largest_step, step_cost)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -203,51 +259,61 @@ class GrooveSearch:
         _thin_out(ridge, coarse)
         used = [cut != "vertical", cut != "lateral"]
         large = [self.usual_swing_px if use else self.usual_drift_px for use in used]
-        usual = (lateral / large[0]) ** 2 + (vertical[:, None] / large[1]) ** 2
-        score = np.empty((len(ridge), *usual.shape), np.float32)
-        score[:] = (-self.swing_cost * usual).astype(np.float32)  # once, not for every cell
-        signs = wall_sign(layout.wall).astype(np.int64)
-        stripes = zip(layout.rest_row, signs, layout.first_row, layout.last_row, layout.from_bottom_px, strict=True)
-        for rest, sign, low, high, from_bottom in stripes:
-            first_row = round(rest) + lateral[0] + sign * vertical
-            depth = from_bottom - vertical
-            on_wall = (depth > BOTTOM_PX) & (depth < layout.half_width_px)
-            rows = np.array([max(np.ceil(low), 0), min(np.floor(high), height - 1)])
-            seen = np.where(on_wall[:, None], rows, [0, -1]).astype(np.int64)
-            _add_stripe(coarse, first_row, seen, np.float32(self.absent), score)
+        swing = self.swing_cost * ((lateral / large[0]) ** 2 + (vertical[:, None] / large[1]) ** 2)
+        first_row = np.rint(layout.rest_row).astype(np.int64)[:, None] + lateral[0]
+        first_row = first_row + wall_sign(layout.wall).astype(np.int64)[:, None] * vertical
+        depth = layout.from_bottom_px[:, None] - vertical
+        on_wall = (depth > BOTTOM_PX) & (depth < layout.half_width_px)
+        rows = np.array([np.maximum(np.ceil(layout.first_row), 0), np.minimum(np.floor(layout.last_row), height - 1)])
+        seen = np.where(on_wall[:, :, None], rows.T[:, None], [0, -1]).astype(np.int64)
         steps = np.array([1 if use else int(len(ridge) > 1) for use in used])
         # what the cut does not use changes slowly: a step of one grid point costs as much as a cell without its stripes
         costs = np.array([self.step_cost * GRID_PX if use else 1.0 for use in used])
-        path, _ = best_path(score, steps[::-1], costs[::-1])
+        absent = np.float32(self.absent)
+        path, _ = _common_path(coarse, swing.astype(np.float32), first_row, seen, absent, steps[::-1], costs[::-1])
         return lateral[path[1]].astype(np.float64), vertical[path[0]].astype(np.float64)
 
     def _own_paths(
         self, ridge: Float32Array, layout: StripeLayout, common: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Let each wall look for its stripes, row by row, near the common path."""
-        path = common.copy()
-        aside = np.arange(-int(self.wall_reach_px), int(self.wall_reach_px) + 1)
-        for wall in (INNER, OUTER):
-            found = _ridges_at(ridge, layout.of_wall(wall), common[wall][:, None] + aside)
-            pull = -0.3 * self.step_cost * aside.astype(np.float64) ** 2
-            steps, costs = np.array([0, 3]), np.array([0.0, self.step_cost])
-            own, _ = best_path((found.sum(axis=0) + pull)[:, None, :], steps, costs)
-            path[wall] += aside[own[1]]
-        near = np.arange(-2, 3)
-        support = np.zeros((layout.wall.size, len(ridge)))
-        for wall in (INNER, OUTER):
-            mine = layout.wall == wall
-            support[mine] = _ridges_at(ridge, layout.of_wall(wall), path[wall][:, None] + near).max(axis=2)
+        path, support = common.copy(), np.zeros((layout.wall.size, len(ridge)))
+        limits = np.array([layout.first_row, layout.last_row])
+        _own(ridge, layout.rest_row, layout.wall, limits, int(self.wall_reach_px), self.step_cost, path, support)
         return path, support
 
 
-def _ridges_at(ridge: Float32Array, layout: StripeLayout, displacement_px: FloatArray) -> FloatArray:
-    """Return the ridges, shape (stripe, cell, place), at displacements of shape (cell, place); 0 out of sight."""
-    rows = np.round(layout.rest_row[:, None, None] + displacement_px).astype(np.int64)
-    seen = (rows >= layout.first_row[:, None, None]) & (rows <= layout.last_row[:, None, None])
-    values = ridge[np.arange(len(ridge))[:, None], np.clip(rows, 0, ridge.shape[1] - 1)]
-    return np.where(seen, values, 0.0)
+@numba.njit(cache=True, nogil=True)
+def _ridge_at(ridge, cell, place, limits):  # type: ignore[no-untyped-def]
+    """The ridge at a place; 0 out of sight."""
+    row = int(np.rint(place))
+    seen = limits[0] <= row <= limits[1]
+    return ridge[cell, min(max(row, 0), ridge.shape[1] - 1)] if seen else np.float32(0)
 
 
+@numba.njit(cache=True, nogil=True)
+def _own(ridge, rest_row, wall, limits, reach, step_cost, path, support):  # type: ignore[no-untyped-def]
+    """Move the path of each wall to where its stripes are, and write how sharp they are there."""
+    steps, costs = np.array([0, 3]), np.array([0.0, step_cost])
+    score = np.empty((len(ridge), 1, 2 * reach + 1))
+    for w in (INNER, OUTER):
+        for cell in range(len(ridge)):
+            for k in range(2 * reach + 1):
+                aside = k - reach
+                score[cell, 0, k] = -PULL * step_cost * aside * aside
+                for i in range(wall.size):
+                    if wall[i] == w:
+                        score[cell, 0, k] += _ridge_at(ridge, cell, rest_row[i] + path[w, cell] + aside, limits[:, i])
+        path[w] += best_path(score, steps, costs)[0][1] - reach
+        for i in range(wall.size):
+            if wall[i] == w:
+                for cell in range(len(ridge)):
+                    for near in range(-2, 3):
+                        seen = _ridge_at(ridge, cell, rest_row[i] + path[w, cell] + near, limits[:, i])
+                        support[i, cell] = seen if near == -2 else max(support[i, cell], seen)
+
+
+PULL = 0.3
+"""A wall is held to the common path by so much of what steps from cell to cell cost."""
 GRID_PX = 3
 """Step of the common search; with ridges seven rows wide nothing is missed, and one step a cell is a slope of 0.37."""

@@ -176,18 +176,34 @@ def _relate(sharp, usual, ceiling):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
+def _sums(wide, count, out):  # type: ignore[no-untyped-def]
+    """Write sums of so many neighbours."""
+    out[:] = np.float32(0)
+    for k in range(count):
+        here = np.uint64(k)
+        for row in range(np.uint64(out.size)):
+            out[row] += wide[here + row]
+
+
+@numba.njit(cache=True, nogil=True)
+def _less(crest, first, share, flank, far, flank_share, out):  # type: ignore[no-untyped-def]
+    begin, beyond = np.uint64(first), np.uint64(far)
+    for row in range(np.uint64(out.size)):
+        out[row] = share * crest[begin + row] - flank_share * (flank[row] + flank[beyond + row])
+
+
+@numba.njit(cache=True, nogil=True)
 def _ridges(sharp, half, near, far, out):  # type: ignore[no-untyped-def]
     cells, height = sharp.shape
-    total = np.zeros(height + 2 * far + 1)
+    wide = np.empty(height + 2 * far, np.float32)
+    crest = np.empty(height + 2 * (far - half), np.float32)
+    flank = np.empty(height + far + near, np.float32)
+    share, flank_share = np.float32(1 / (2 * half + 1)), np.float32(0.5 / (far - near + 1))
     for cell in range(cells):
-        for k in range(total.size - 1):
-            total[k + 1] = total[k] + sharp[cell, min(max(k - far, 0), height - 1)]
-        # row r lies at total[r + far + 1] − total[r + far]
-        ridge, below, above = total[far - half :], total, total[far + near :]
-        for row in range(height):
-            crest = (ridge[row + 2 * half + 1] - ridge[row]) / (2 * half + 1)
-            flanks = below[row + far - near + 1] - below[row] + above[row + far - near + 1] - above[row]
-            out[cell, row] = crest - 0.5 * flanks / (far - near + 1)
+        wide[:far], wide[far : far + height], wide[far + height :] = sharp[cell, 0], sharp[cell], sharp[cell, -1]
+        _sums(wide, 2 * half + 1, crest)
+        _sums(wide, far - near + 1, flank)
+        _less(crest, far - half, share, flank, far + near, flank_share, out[cell])
 
 
 def ridges(sharp: Float32Array, *, half_px: int = 3, flank_px: tuple[int, int] = (8, 16)) -> Float32Array:
