@@ -234,10 +234,19 @@ def overlay(
 
 def _by_fraction(shift_px: FloatArray, width: int, canvas_width: int) -> tuple[IntArray, FloatArray]:
     """Return number, first and last but one column, and own column minus theirs, of all frames, and their fractions, sorted."""
-    found = [(*placement(shift, width, canvas_width), k) for k, shift in enumerate(shift_px.tolist())]
-    found.sort(key=lambda one: one[3:])
-    places = np.array([(k, start, stop, offset) for start, stop, offset, _, k in found], np.int64)
-    return places.reshape(-1, 4), np.array([one[3] for one in found])
+    places, fraction = placements(shift_px, width, canvas_width)
+    order = np.argsort(fraction, kind="stable")
+    return np.column_stack([order, places[order]]), fraction[order]
+
+
+@numba.njit(cache=True, nogil=True)
+def placements(shift_px, width, canvas_width):  # type: ignore[no-untyped-def]
+    """Return first and last but one column and own column minus theirs, [frame, 3], and fraction of all frames."""
+    places, fraction = np.empty((shift_px.size, 3), np.int64), np.empty(shift_px.size)
+    for k in range(shift_px.size):
+        start, stop, offset, fraction[k] = placement(shift_px[k], width, canvas_width)
+        places[k] = start, stop, offset
+    return places, fraction
 
 
 def sum_type(images: ImageArray) -> type[np.uint16] | type[np.uint32]:
@@ -268,8 +277,7 @@ def to_phases(shift_px: FloatArray) -> FloatArray:
 def frames_in(width: int, shift_px: FloatArray) -> npt.NDArray[np.int64]:
     """Return how many frames of such a width each column of their overlay rests on."""
     counts = np.zeros(overlay_width(width, shift_px), np.int64)
-    for shift in shift_px:
-        start, stop, _, _ = placement(float(shift), width, counts.size)
+    for start, stop, _ in placements(shift_px, width, counts.size)[0]:
         counts[start:stop] += 1
     return counts
 

@@ -21,14 +21,13 @@ from gramoscope.pickup.cuda import film_kernels, hearing_kernels
 from gramoscope.pickup.cuda.ear_there import EarThere, ear_there
 from gramoscope.pickup.cuda.launching import threads_for
 from gramoscope.pickup.device import Film, Kept
-from gramoscope.pickup.overlay import TILE_COLUMNS, Overlay, frames_in, overlay_width, places_brighter
+from gramoscope.pickup.overlay import TILE_COLUMNS, Overlay, frames_in, overlay_width, placements, places_brighter
 from gramoscope.pickup.registration import (
     REACH_PX,
     ROUNDS,
     added_up,
     cubic_taps,
     expected_steps_px,
-    placement,
     textured_rows,
 )
 from gramoscope.pickup.texture.following import REACH, places_of
@@ -151,9 +150,8 @@ def placed(shift_px: FloatArray, width: int) -> tuple[npt.NDArray[np.int64], Flo
     taps : float32 array, shape (frame, 4)
         Of the interpolation between its columns.
     """
-    of_frames = [placement(shift, width, overlay_width(width, shift_px)) for shift in shift_px.tolist()]
-    places = np.array([(start, stop, offset) for start, stop, offset, _ in of_frames], np.int64)
-    return places, np.array([cubic_taps(fraction) for *_, fraction in of_frames], np.float32)
+    places, fraction = placements(shift_px, width, overlay_width(width, shift_px))
+    return places, np.array([cubic_taps(one) for one in fraction.tolist()], np.float32)
 
 
 def drawn(

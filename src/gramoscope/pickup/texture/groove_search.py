@@ -20,7 +20,6 @@ from gramoscope.errors import require
 from gramoscope.pickup.texture.layout import BOTTOM_PX, StripeLayout, wall_sign
 from gramoscope.pickup.texture.sharpness import ridges
 
-
 # Places are unsigned, for signed ones may count from the end, and keep loops from being vectorised; arrays are lines, for
 # taking part of one costs as much as the work on it.
 

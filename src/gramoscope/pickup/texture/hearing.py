@@ -8,16 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numba
 import numpy as np
 from scipy import fft
 
-from gramoscope.conventions import BoolArray, Float32Array, FloatArray, IntArray
+from gramoscope.conventions import INNER, OUTER, BoolArray, Float32Array, FloatArray, IntArray
 from gramoscope.pickup.texture.filter_bank import energies, let_through
 from gramoscope.pickup.texture.following import REACH, TAPS_OF_PHASES, follow_rows, padded_rows, wide_rows
-from gramoscope.pickup.texture.layout import StripeLayout
+from gramoscope.pickup.texture.layout import StripeLayout, see
 from gramoscope.pickup.texture.likelihood import (
     LOUDNESS_BELL,
     TAPER,
@@ -77,6 +78,11 @@ class Ear:
     half_px: int
     band: Band
     length: int
+
+    @cached_property
+    def in_lanes(self) -> tuple[Float32Array, Float32Array]:
+        """The basis and what is usual, with sixteen channels."""
+        return _in_lanes(self.basis, (2,)), _in_lanes(self.usual, (1, 2))
 
 
 def ear_of(
@@ -140,25 +146,47 @@ def clear_columns(
     clear : bool array, shape (stripe, column)
         Where a stripe is sharp, in its half of the picture, seen by enough frames and not burnt.
     """
-    rows = layout.rows(stretch.displacement_px)
-    clear = layout.visible(rows, half_px=half_px)[number]
-    rows = rows[number]
-    _clear(stretch.usable, stretch.burnt, stretch.support[number], rows, half_px, least_support, BURNT_SHARE, clear)
+    rows = np.empty((number.size, stretch.usable.size))
+    clear = np.empty(rows.shape, np.bool_)
+    _clear(
+        stretch.displacement_px,
+        (layout.rest_row[number], layout.wall[number], layout.seen_between[:, number], layout.middle_row),
+        (float(half_px), layout.on_wall_px(half_px), float(least_support)),
+        (stretch.usable, stretch.burnt, stretch.support[number]),
+        rows,
+        clear,
+    )
     return rows, clear
 
 
 @numba.njit(cache=True, nogil=True)
-def _clear(usable, burnt, support, rows, half_px, least_support, burnt_share, clear):  # type: ignore[no-untyped-def]
-    """Take away what is not usable, has no support, or is burnt."""
-    spoilt = np.zeros(usable.size, np.int64)
-    for i in range(rows.shape[0]):
+def _clear(displacement, stripes, needed, picture, rows, clear):  # type: ignore[no-untyped-def]
+    """Write where stripes run, and which columns are seen whole, usable, supported and not burnt."""
+    rest_row, wall, limits, middle_row = stripes
+    half_px, from_middle, least_support = needed
+    usable, burnt, support = picture
+    middle = np.empty(usable.size)
+    for x in range(usable.size):
+        middle[x] = middle_row + 0.5 * (displacement[INNER, x] + displacement[OUTER, x])
+    for i in range(rest_row.size):
         for x in range(usable.size):
-            clear[i, x] &= usable[x] and support[i, x] >= least_support
+            rows[i, x] = rest_row[i] + displacement[wall[i], x]
+            clear[i, x] = usable[x] and support[i, x] >= least_support
+    see(rows, middle, wall, limits, from_middle, half_px, clear)
+    if len(burnt) > 0:
+        _burn(burnt, rows, half_px, clear)
+
+
+@numba.njit(cache=True, nogil=True)
+def _burn(burnt, rows, half_px, clear):  # type: ignore[no-untyped-def]
+    """Take away the columns in which too much of a window is burnt."""
+    spoilt = np.zeros(rows.shape[1], np.int64)
+    for i in range(len(rows)):
         spoilt[:] = 0
         for x, row in burnt:
             spoilt[x] += abs(row - np.rint(rows[i, x])) <= half_px
         for x, _ in burnt:
-            clear[i, x] &= spoilt[x] <= burnt_share * (2 * half_px + 1)
+            clear[i, x] &= spoilt[x] <= BURNT_SHARE * (2 * half_px + 1)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -263,8 +291,7 @@ def heard(
     """
     drawn = np.empty((len(rows), ear.length, LANES), np.float32)
     weight, said = np.empty(rows.shape, np.float32), np.empty(rows.shape)
-    basis, usual = _in_lanes(ear.basis, (2,)), _in_lanes(ear.usual, (1, 2))
-    _draw(columns, rows, clear, ear.half_px, ear.half_taps, basis, usual, power_limits, drawn, weight)
+    _draw(columns, rows, clear, ear.half_px, ear.half_taps, *ear.in_lanes, power_limits, drawn, weight)
     spectrum = fft.rfft(drawn, axis=1)
     through = np.zeros((len(rows), ear.sign.shape[1], spectrum.shape[1]), np.complex64)
     let_through(spectrum, ear.filters, ear.band.bins(ear.length).start, through)

@@ -107,32 +107,34 @@ class StripeLayout:
 
         They must lie in the half of the picture that is sharp there, above the groove's rounded bottom, below the land.
         """
-        seen = np.empty(rows.shape, np.bool_)
-        limits = (BOTTOM_PX + half_px, self.half_width_px - half_px)
-        _see(
-            rows, self.rest_row, self.wall, self.first_row, self.last_row, float(half_px), self.middle_row, limits, seen
-        )
+        seen = np.ones(rows.shape, np.bool_)
+        # the groove's middle moves as the walls do in the mean, of which one stripe each tells
+        first = [np.flatnonzero(self.wall == wall)[:1] for wall in (INNER, OUTER)]
+        known = np.concatenate(first)
+        moved = (rows[known] - self.rest_row[known, None]).mean(axis=0) if known.size else np.zeros(rows.shape[1])
+        see(rows, self.middle_row + moved, self.wall, self.seen_between, self.on_wall_px(half_px), float(half_px), seen)
         return seen
+
+    @property
+    def seen_between(self) -> FloatArray:
+        """First and last row of each stripe, shape (2, stripe)."""
+        return np.array([self.first_row, self.last_row])
+
+    def on_wall_px(self, half_px: float) -> tuple[float, float]:
+        """Return how near to the groove's middle, and how far from it, windows of ± `half_px` rows show a wall."""
+        return BOTTOM_PX + half_px, self.half_width_px - half_px
 
 
 @numba.njit(cache=True, nogil=True)
-def _see(rows, rest_row, wall, first_row, last_row, half_px, middle_row, from_middle, seen):  # type: ignore[no-untyped-def]
-    # the groove's middle moves as the walls do in the mean, of which one stripe each tells
-    middle, walls = np.zeros(rows.shape[1]), 0
-    for w in (INNER, OUTER):
-        for i in range(wall.size):
-            if wall[i] == w:
-                middle += rows[i] - rest_row[i]
-                walls += 1
-                break
-    middle = middle_row + middle / max(walls, 1)
+def see(rows, middle, wall, limits, from_middle, half_px, seen):  # type: ignore[no-untyped-def]
+    """Take away what windows about stripes, [stripe, column], do not see whole, of a groove with its middle in some rows."""
     for i in range(rows.shape[0]):
         side = 1.0 if wall[i] == INNER else -1.0
+        low, high = limits[0, i] + half_px, limits[1, i] - half_px
         for x in range(rows.shape[1]):
-            row = rows[i, x]
-            away = side * (row - middle[x])
-            inside = (row - half_px >= first_row[i]) & (row + half_px <= last_row[i])
-            seen[i, x] = inside & (away >= from_middle[0]) & (away <= from_middle[1])
+            away = side * (rows[i, x] - middle[x])
+            inside = (rows[i, x] >= low) & (rows[i, x] <= high)
+            seen[i, x] &= inside & (away >= from_middle[0]) & (away <= from_middle[1])
 
 
 def _all_stripes(bench: Bench) -> tuple[Stripe, ...]:

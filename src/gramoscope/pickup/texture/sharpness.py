@@ -163,7 +163,7 @@ def _limit(cell, gain, ceiling):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _relate(sharp, usual, ceiling):  # type: ignore[no-untyped-def]
-    """Turn energies into amplitudes above the noise, of rows that usually have so much, in units of a typical cell's largest."""
+    """Turn energies into amplitudes above the noise (what quiet rows usually have), a typical cell's largest being 1."""
     noise = np.float32(np.quantile(usual, QUIETEST))
     peak = np.empty(len(sharp), np.float32)
     for cell in range(len(sharp)):
