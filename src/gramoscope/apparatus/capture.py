@@ -19,7 +19,8 @@ from gramoscope.apparatus.filming import MARKER
 from gramoscope.apparatus.fingerprint import sha256_of_file, sha256_of_files
 from gramoscope.apparatus.frame_log import FrameLog, nominal_arc_m, read_log
 from gramoscope.apparatus.manifest import MANIFEST_NAME, Manifest, read_manifest
-from gramoscope.camera.frames import FrameSource, Layout, Lost, Unusable, develop
+from gramoscope.camera.contents import Contents
+from gramoscope.camera.frames import Frame, FrameSource, Layout, Lost, Unusable, develop
 from gramoscope.camera.frames_image import ImageFrames
 from gramoscope.camera.frames_tiff import TiffFrames
 from gramoscope.camera.frames_video import VideoFrames
@@ -79,13 +80,15 @@ class Capture:
         filming = (f"{MARKER} says that it is still being filmed",) if (self.folder / MARKER).is_file() else ()
         return (*(self.log.problems if self.log is not None else ()), *filming)
 
-    def group(self, number: int) -> FrameGroup:
+    def group(self, number: int, contents: Contents | None = None) -> FrameGroup:
         """Read one stretch.
 
         Parameters
         ----------
         number : int
             0 … `group_count` − 1.
+        contents : Contents, optional
+            From which files are read, where somebody else wants them too.
 
         Returns
         -------
@@ -97,9 +100,8 @@ class Capture:
         ArgumentError
             If there is no such group.
         """
-        return self._group(
-            number, lambda images, valid, remarks: self._read_into(images, valid, remarks, number=number)
-        )
+        stored = self.source.read_group(number, contents or Contents())
+        return self._group(number, lambda images, valid, remarks: self._read_into(images, valid, remarks, stored))
 
     def unread_group(self, number: int, why: str) -> FrameGroup:
         """Return a stretch none of whose frames could be read, for a reason that is not in the capture.
@@ -132,9 +134,10 @@ class Capture:
             problems=remarks.in_words(),
         )
 
-    def _read_into(self, images: ImageArray, valid: npt.NDArray[np.bool_], remarks: _Remarks, *, number: int) -> None:
+    def _read_into(
+        self, images: ImageArray, valid: npt.NDArray[np.bool_], remarks: _Remarks, stored: Iterator[Frame | Lost]
+    ) -> None:
         expected = len(images)
-        stored = self.source.read_group(number)
         read = 0
         for read, frame in enumerate(islice(stored, expected), start=1):
             if isinstance(frame, Lost):

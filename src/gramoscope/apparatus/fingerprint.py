@@ -6,8 +6,7 @@ import hashlib
 from collections.abc import Iterable
 from pathlib import Path
 
-PIECE_BYTES = 1 << 20
-"""Files are summed in such pieces: smaller ones ask for the interpreter too often, larger ones fall out of the cache."""
+from gramoscope.camera.contents import PIECE_BYTES
 
 
 def sha256_of_file(path: Path) -> str:

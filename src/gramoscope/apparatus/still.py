@@ -15,6 +15,7 @@ from gramoscope.apparatus.groove_direction import groove_direction
 from gramoscope.apparatus.manifest import MANIFEST_NAME
 from gramoscope.apparatus.manifest_still import StillManifest, read_still_manifest
 from gramoscope.apparatus.still_bench import Row, StillBench, scale_of, sense_across
+from gramoscope.camera.contents import Contents
 from gramoscope.camera.frames import Frame, Lost
 from gramoscope.camera.frames_image import read_picture
 from gramoscope.camera.frames_tiff import read_first_page
@@ -236,7 +237,7 @@ def read_photograph(path: Path, *, folder: Path) -> Frame | Lost:
     """Read a picture as it was stored, or say why it is of no use; it must not lie outside the folder."""
     if not is_inside(path, folder):
         return Lost(f"{path.name} lies outside the folder of the capture and was not opened")
-    stored = read_first_page(path) if path.suffix.lower() in TIFF_SUFFIXES else read_picture(path)
+    stored = read_first_page(path) if path.suffix.lower() in TIFF_SUFFIXES else read_picture(path, Contents())
     if isinstance(stored, Lost):
         return stored
     if stored.dtype not in (np.uint8, np.uint16):

@@ -16,6 +16,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from gramoscope.camera.contents import Contents
 from gramoscope.camera.grey import fit_to_bits, grey_of_colour
 from gramoscope.camera.sensor import Sensor
 from gramoscope.conventions import mirror
@@ -48,8 +49,11 @@ class FrameSource(Protocol):
     def layout(self) -> Layout:
         """Which layout it is."""
 
-    def read_group(self, number: int) -> Iterator[Frame | Lost]:
-        """Yield the frames of a group as stored; too few when the file ends early. Never raises for a broken file."""
+    def read_group(self, number: int, contents: Contents) -> Iterator[Frame | Lost]:
+        """Yield the frames of a group as stored; too few when the file ends early. Never raises for a broken file.
+
+        Files that are read whole are read from their contents, which may be wanted for something else too.
+        """
 
     def files_of_group(self, number: int) -> tuple[Path, ...]:
         """Return the files that hold this group and no other; the missing ones too."""

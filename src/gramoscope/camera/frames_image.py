@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import struct
 import zlib
 from collections.abc import Iterator
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageFile
 
+from gramoscope.camera.contents import Contents
 from gramoscope.camera.frames import Frame, Layout, Lost, words_of
 from gramoscope.camera.frames_tiff import read_pages
 from gramoscope.camera.pattern import TIFF_SUFFIXES, FramePattern, is_inside
@@ -31,20 +33,19 @@ class ImageFrames:
     sensor: Sensor
     layout: Layout = "images"
 
-    def read_group(self, number: int) -> Iterator[Frame | Lost]:
+    def read_group(self, number: int, contents: Contents) -> Iterator[Frame | Lost]:
         """Yield the pictures of one group."""
         for path in self.files_of_group(number):
-            yield self._read(path)
+            yield self._read(path, contents)
 
-    def _read(self, path: Path) -> Frame | Lost:
+    def _read(self, path: Path, contents: Contents) -> Frame | Lost:
         if not is_inside(path, self.folder):
             return Lost(f"{path.name} lies outside the folder of the capture and was not opened")
         if path.suffix.lower() in TIFF_SUFFIXES:
-            page = next(
-                read_pages(path, folder=self.folder, frames=1, sensor=self.sensor), Lost(f"{path.name} has no page")
-            )
+            pages = read_pages(path, contents, folder=self.folder, frames=1, sensor=self.sensor)
+            page = next(pages, Lost(f"{path.name} has no page"))
             return Lost(page.why) if isinstance(page, Lost) else page
-        return read_picture(path)
+        return read_picture(path, contents)
 
     def files_of_group(self, number: int) -> tuple[Path, ...]:
         """Return one file for each frame."""
@@ -59,12 +60,13 @@ class ImageFrames:
         return any(path.is_file() for number in range(self.groups) for path in self.files_of_group(number))
 
 
-def read_picture(path: Path) -> Frame | Lost:
+def read_picture(path: Path, contents: Contents) -> Frame | Lost:
     """Read a PNG, BMP or JPEG.
 
     Parameters
     ----------
     path : Path
+    contents : Contents
 
     Returns
     -------
@@ -72,7 +74,7 @@ def read_picture(path: Path) -> Frame | Lost:
     """
     try:
         with quiet_warnings():
-            picture = Image.open(path)
+            picture = Image.open(io.BytesIO(contents.of(path).data))
         with picture:
             return _pixels(picture, path)
     except FileNotFoundError:

@@ -12,8 +12,10 @@ import numpy as np
 import tifffile
 from PIL import Image
 
+from gramoscope.camera.contents import Contents
 from gramoscope.camera.frames import Frame, Layout, Lost, words_of, wrong_size
 from gramoscope.camera.pattern import FramePattern, is_inside
+from gramoscope.camera.plain_tiff import plain_pages
 from gramoscope.camera.quiet import quiet_log, quiet_warnings
 from gramoscope.camera.sensor import Sensor
 
@@ -32,10 +34,10 @@ class TiffFrames:
     sensor: Sensor
     layout: Layout = "tiff"
 
-    def read_group(self, number: int) -> Iterator[Frame | Lost]:
+    def read_group(self, number: int, contents: Contents) -> Iterator[Frame | Lost]:
         """Yield the pages of one group's file."""
         path = self.pattern.path(self.folder, group=number)
-        return read_pages(path, folder=self.folder, frames=self.frames_per_group, sensor=self.sensor)
+        return read_pages(path, contents, folder=self.folder, frames=self.frames_per_group, sensor=self.sensor)
 
     def files_of_group(self, number: int) -> tuple[Path, ...]:
         """Return the one file of the group."""
@@ -50,13 +52,16 @@ class TiffFrames:
         return any(self.files_of_group(number)[0].is_file() for number in range(self.groups))
 
 
-def read_pages(path: Path, *, folder: Path, frames: int, sensor: Sensor) -> Iterator[Frame | Lost]:
+def read_pages(path: Path, contents: Contents, *, folder: Path, frames: int, sensor: Sensor) -> Iterator[Frame | Lost]:
     """Yield the pages of a TIFF in order.
 
     Parameters
     ----------
-    path, folder : Path
-        The file, and the folder that it must not leave.
+    path : Path
+    contents : Contents
+        From which the file is read.
+    folder : Path
+        Which it must not leave.
     frames : int
         How many are expected.
     sensor : Sensor
@@ -70,9 +75,11 @@ def read_pages(path: Path, *, folder: Path, frames: int, sensor: Sensor) -> Iter
         yield Lost(f"{path.name} lies outside the folder of the capture and was not opened", rest=True)
         return
     try:
+        data = contents.of(path)
         with quiet_log():
             tiff = tifffile.TiffFile(path)
             channels = _channel_pages(tiff, frames=frames)
+            plain = plain_pages(tiff, data) if channels == 1 else []
     except FileNotFoundError:
         yield Lost(f"{path.name} is missing", rest=True)
         return
@@ -80,6 +87,9 @@ def read_pages(path: Path, *, folder: Path, frames: int, sensor: Sensor) -> Iter
         yield Lost(f"{path.name} cannot be read ({words_of(error)})", rest=True)
         return
     with tiff:
+        if plain and plain[0].shape == (sensor.height_px, sensor.width_px):
+            yield from (page.astype(page.dtype.newbyteorder("="), copy=False) for page in plain)
+            return
         yield from _read_pages(tiff, path=path, channels=channels, sensor=sensor)
 
 

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from gramoscope.camera.contents import Contents
 from gramoscope.camera.frames import Frame, Layout, Lost, words_of
 from gramoscope.camera.sensor import Sensor
 from gramoscope.errors import CaptureError, NoFramesError
@@ -67,7 +68,7 @@ class VideoFrames:
         self._tape = _Tape(path)
         self._kept: OrderedDict[int, Frame | Lost] = OrderedDict()
 
-    def read_group(self, number: int) -> Iterator[Frame | Lost]:
+    def read_group(self, number: int, contents: Contents) -> Iterator[Frame | Lost]:
         """Yield the frames of one group."""
         first = number * self.frames_per_group
         with self._lock:

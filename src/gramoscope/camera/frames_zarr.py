@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 import zarr
 
+from gramoscope.camera.contents import Contents
 from gramoscope.camera.frames import Frame, Layout, Lost, words_of, wrong_size
 from gramoscope.camera.quiet import quiet_warnings
 from gramoscope.camera.sensor import Sensor
@@ -33,7 +34,7 @@ class ZarrFrames:
     sensor: Sensor
     layout: Layout = "zarr"
 
-    def read_group(self, number: int) -> Iterator[Frame | Lost]:
+    def read_group(self, number: int, contents: Contents) -> Iterator[Frame | Lost]:
         """Yield the frames of one group; a chunk that was never written counts as a missing frame."""
         size = tuple(self.array.shape[self.axes.index(axis)] for axis in "xy")
         if size != (self.sensor.width_px, self.sensor.height_px):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from gramoscope.apparatus.capture import Capture
 from gramoscope.apparatus.fingerprint import sha256_of_file
+from gramoscope.camera.contents import Contents
 from gramoscope.player.provenance import hash_group
 
 
@@ -40,9 +41,12 @@ def look_at(capture: Capture, number: int) -> Look:
     return {path.relative_to(capture.folder).as_posix(): _stat(path) for path in capture.files_of_group(number)}
 
 
-def seen(capture: Capture, number: int, before: Look) -> tuple[tuple[FileSeen, ...], bool]:
-    """Return the files of a group with their sums, and whether they stayed as they were when somebody looked before."""
-    sums = hash_group(capture, number)
+def seen(capture: Capture, number: int, before: Look, read: Contents) -> tuple[tuple[FileSeen, ...], bool]:
+    """Return the files of a group with their sums, and whether they stayed as they were when somebody looked before.
+
+    What was read of them may have been summed already; the others are now.
+    """
+    sums = hash_group(capture, number, read)
     after = look_at(capture, number)
     return tuple(FileSeen(name, sums[name], *before[name]) for name in sums), after == before
 

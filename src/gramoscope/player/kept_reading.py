@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from gramoscope.apparatus.capture import Capture
+from gramoscope.camera.contents import Contents
 from gramoscope.errors import CaptureError, GramoscopeError, require
 from gramoscope.interruption import ctrl_c_waits
 from gramoscope.pickup.cartridge import Pickup
@@ -306,10 +307,13 @@ def _noting(capture: Capture, files: dict[str, FileSeen]) -> Capture:
 class _NotingCapture(Capture):
     files: dict[str, FileSeen] = field(default_factory=dict)
 
-    def group(self, number: int) -> FrameGroup:
+    def group(self, number: int, contents: Contents | None = None) -> FrameGroup:
         before = look_at(self, number)
-        group = super().group(number)
+        if before.keys() <= self.files.keys():
+            return super().group(number, contents)
+        read = Contents(summed=True)
+        group = super().group(number, read)
         if not before.keys() <= self.files.keys():
-            found, _ = seen(self, number, before)
+            found, _ = seen(self, number, before, read)
             self.files.update({file.name: file for file in found})
         return group

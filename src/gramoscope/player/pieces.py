@@ -15,6 +15,7 @@ import numpy as np
 from llvmlite import binding
 
 from gramoscope.apparatus.capture import Capture, open_capture
+from gramoscope.camera.contents import Contents
 from gramoscope.errors import GramoscopeError, WorkerError
 from gramoscope.pickup.cartridge import Pickup
 from gramoscope.player.devices import device_of_report
@@ -109,10 +110,9 @@ class Reader:
 def read_group(capture: Capture, pickup: Pickup, number: int) -> GroupReading:
     """Read a group, and say what its files were; once more if they changed meanwhile."""
     for _ in range(LOOKS):
-        before = look_at(capture, number)
-        group = capture.group(number)
-        trace = pickup.read(group)
-        files, stayed = seen(capture, number, before)
+        before, contents = look_at(capture, number), Contents(summed=True)
+        trace = pickup.read(group := capture.group(number, contents))
+        files, stayed = seen(capture, number, before, contents)
         if stayed:
             break
     return GroupReading(trace, int(np.count_nonzero(~group.valid)), files)

@@ -14,6 +14,7 @@ from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 from gramoscope.apparatus.fingerprint import sha256_of_file
+from gramoscope.camera.contents import Contents
 from gramoscope.player.recipe import Recipe, table_of_recipe
 
 if TYPE_CHECKING:
@@ -95,9 +96,16 @@ class InputHashes:
         }
 
 
-def hash_group(capture: AnyCapture, number: int) -> dict[str, str]:
-    """Return path → SHA-256 of the files that hold one group; an unreadable file has an empty sum."""
-    return {_inside(capture, path): sha256_of_file(path) for path in capture.files_of_group(number)}
+def hash_group(capture: AnyCapture, number: int, read: Contents | None = None) -> dict[str, str]:
+    """Return path → SHA-256 of the files that hold one group; an unreadable file has an empty sum.
+
+    Files that were summed when they were read are not read again.
+    """
+    sums = read.sums if read is not None else {}
+    return {
+        _inside(capture, path): sums[path] if path in sums else sha256_of_file(path)
+        for path in capture.files_of_group(number)
+    }
 
 
 def _inside(capture: AnyCapture, path: Path) -> str:
