@@ -11,7 +11,7 @@ from gramoscope.apparatus.capture import Capture
 from gramoscope.apparatus.inspection import frame_bytes
 from gramoscope.player.film import learned
 from gramoscope.player.pieces import read_group
-from gramoscope.player.reading_store import LARGEST_PIECE, QUANTITIES, GroupReading
+from gramoscope.player.reading_store import LARGEST_PIECE, QUANTITIES, STRIP_ROWS, GroupReading, Rows
 from gramoscope.player.recipe import Recipe
 
 MEASURED_GROUPS = 8
@@ -95,5 +95,9 @@ def plan_of(capture: Capture, recipe: Recipe, workers: int) -> Plan:
 
 def _bytes_of(reading: GroupReading) -> int:
     trace = reading.trace
-    strips = sum(end.strip.nbytes for end in (trace.head, trace.tail) if end is not None)
-    return strips + len(QUANTITIES) * trace.offset_m.nbytes + trace.flags.nbytes
+    strips = sum(
+        -(-Rows.of(end).used.size // STRIP_ROWS) * STRIP_ROWS * end.strip[0].nbytes
+        for end in (trace.head, trace.tail)
+        if end is not None
+    )
+    return int(strips) + len(QUANTITIES) * trace.offset_m.nbytes + trace.flags.nbytes

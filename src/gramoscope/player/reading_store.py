@@ -3,8 +3,8 @@
     walls     float64  (group, quantity, wall, sample)   offset_m, offset_sigma_m, slope, slope_sigma
     flags     uint16   (group, wall, sample)
     places    float64  (group, place)                    arc_start_m, arc_step_m, correlation_samples, wall angles
-    strips    float32  (group, end, row, column)         the texture at both ends, for the splice
-    words     text     (piece,)                          how long each group's rows are, its files, problems, sums
+    strips    float32  (group, end, row, column)         the texture at both ends, for the splice; only rows that have any
+    words     text     (piece,)                          how long each group's rows are, and which, its files, problems, sums
     learned   uint8    (byte,)                           what the passage taught the cartridge
 
 A chunk holds a piece of the passage, so that pieces are written side by side by whoever read them. Rows are as long as they
@@ -20,14 +20,14 @@ import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import zarr
 
 from gramoscope.apparatus.bench import Bench
 from gramoscope.camera.quiet import quiet_warnings
-from gramoscope.conventions import FloatArray
+from gramoscope.conventions import Float32Array, FloatArray, IntArray
 from gramoscope.listening.whole_file import output_error
 from gramoscope.player.files_seen import FileSeen
 from gramoscope.player.kept_records import DamagedRecordError, bytes_of, record_of
@@ -44,6 +44,8 @@ LARGEST_PIECE = 64
 """Groups: a minute or so of work, and some ten megabytes."""
 PIECES = 16
 """A shorter passage has at least so many pieces, or one for each group, so that all workers have something to do."""
+STRIP_ROWS = 64
+"""A chunk holds so many rows of a strip; most of the picture is out of focus, and has none."""
 _ROOM = {"walls": 4, "flags": 4, "strips": 8}
 """A chunk holds so many samples or columns: the picture's width over this. Longer rows need a second chunk."""
 
@@ -181,8 +183,8 @@ class ReadingStore:
     def _read_arrays(self, number: int, words: Mapping[str, Any]) -> dict[str, Any]:
         groups, said = self.groups_of(number), words["groups"]
         place, samples = slice(groups.start, groups.stop), _most(one["samples"] for one in said)
-        strips = [size for one in said for size in one["strips"] if size is not None]
-        rows, columns = _most(size[0] for size in strips), _most(size[1] for size in strips)
+        strips = [Rows.said(end) for one in said for end in one["strips"] if end is not None]
+        rows, columns = _most(strip.used.size for strip in strips), _most(strip.columns for strip in strips)
         found = {
             "walls": self.arrays["walls"][place, :, :, :samples],
             "flags": self.arrays["flags"][place, :, :samples],
@@ -240,7 +242,7 @@ def create_store(
             _create(group, "walls", (group_count, 4, 2, longest), (piece, 4, 2, samples), "f8", fill=np.nan)
             _create(group, "flags", (group_count, 2, longest), (piece, 2, samples), "u2")
             _create(group, "places", (group_count, len(PLACES)), (piece, len(PLACES)), "f8", fill=np.nan)
-            _create(group, "strips", (group_count, 2, height, longest), (piece, 2, height, columns), "f4")
+            _create(group, "strips", (group_count, 2, height, longest), (piece, 2, STRIP_ROWS, columns), "f4")
             group.create_array("words", shape=(-(-group_count // piece),), chunks=(1,), dtype=str, config=_CONFIG)
             group.attrs["reading"] = said  # last: a store without it was not made to its end
         return ReadingStore(root, _arrays(root), manifest, recipe, group_count, piece)
@@ -297,14 +299,53 @@ def discard_store(root: Path) -> None:
     shutil.rmtree(root, ignore_errors=True)
 
 
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Which rows of a strip are kept; the others are zero.
+
+    Attributes
+    ----------
+    used : int64 array, shape (row,)
+    height, columns : int
+        Of the strip.
+    """
+
+    used: IntArray
+    height: int
+    columns: int
+
+    @classmethod
+    def of(cls, end: Texture) -> Self:
+        """Return the rows of a strip that have any texture, even if it is −0."""
+        return cls(np.flatnonzero(end.strip.view(np.uint32).any(axis=1)), *end.strip.shape)
+
+    @classmethod
+    def said(cls, words: Mapping[str, Any]) -> Self:
+        """Return the rows that words tell of."""
+        runs = [np.arange(first, stop) for first, stop in words["rows"]]
+        return cls(np.concatenate([np.zeros(0, np.int64), *runs]), *words["size"])
+
+    def in_words(self) -> dict[str, Any]:
+        """Return the runs of rows, each by its first and the one after its last, and the size of the strip."""
+        runs = np.split(self.used, np.flatnonzero(np.diff(self.used) > 1) + 1) if self.used.size else []
+        return {"rows": [[int(run[0]), int(run[-1]) + 1] for run in runs], "size": [self.height, self.columns]}
+
+    def unpacked(self, kept: Float32Array) -> Float32Array:
+        """Return the strip, of the rows that were kept."""
+        strip = np.zeros((self.height, self.columns), np.float32)
+        strip[self.used] = kept[: self.used.size, : self.columns]
+        return strip
+
+
 def _most(lengths: Any) -> int:
     return max(lengths, default=0)
 
 
 def _arrays_of(traces: Sequence[WallTrace]) -> dict[str, Any]:
     samples = _most(trace.offset_m.shape[1] for trace in traces)
-    strips = [end.strip.shape for trace in traces for end in (trace.head, trace.tail) if end is not None]
-    rows, columns = _most(shape[0] for shape in strips), _most(shape[1] for shape in strips)
+    ends = [[None if end is None else Rows.of(end) for end in (trace.head, trace.tail)] for trace in traces]
+    strips = [rows for both in ends for rows in both if rows is not None]
+    rows, columns = _most(strip.used.size for strip in strips), _most(strip.columns for strip in strips)
     arrays: dict[str, Any] = {
         "walls": np.full((len(traces), 4, 2, samples), np.nan),
         "flags": np.zeros((len(traces), 2, samples), np.uint16),
@@ -315,9 +356,9 @@ def _arrays_of(traces: Sequence[WallTrace]) -> dict[str, Any]:
         for k, quantity in enumerate(QUANTITIES):
             arrays["walls"][i, k, :, : trace.offset_m.shape[1]] = getattr(trace, quantity)
         arrays["flags"][i, :, : trace.flags.shape[1]] = trace.flags
-        for k, end in enumerate((trace.head, trace.tail)):
-            if end is not None:
-                arrays["strips"][i, k, : end.strip.shape[0], : end.strip.shape[1]] = end.strip
+        for k, (end, kept) in enumerate(zip((trace.head, trace.tail), ends[i], strict=True)):
+            if end is not None and kept is not None:
+                arrays["strips"][i, k, : kept.used.size, : kept.columns] = end.strip[kept.used]
     # there are many NaNs, with a sign for instance; a chunk of nothing else comes back as the one it is filled with
     for name in ("walls", "places"):
         arrays[name][np.isnan(arrays[name])] = np.nan
@@ -336,7 +377,7 @@ def _words_of(reading: GroupReading) -> dict[str, Any]:
         "samples": trace.offset_m.shape[1],
         "frame_step_m": trace.frame_step_m.tolist(),
         "problems": list(trace.problems),
-        "strips": [None if end is None else list(end.strip.shape) for end in ends],
+        "strips": [None if end is None else Rows.of(end).in_words() for end in ends],
         "strip_places": [
             None if end is None else [float(end.arc_start_m), float(end.pixel_pitch_m), float(end.stage_m)]
             for end in ends
@@ -370,7 +411,5 @@ def _reading_of(said: Mapping[str, Any], i: int, arrays: Mapping[str, Any]) -> G
 
 
 def _strip_of(said: Mapping[str, Any], end: int, strips: Any) -> Texture | None:
-    size, place = said["strips"][end], said["strip_places"][end]
-    if size is None:
-        return None
-    return Texture(np.ascontiguousarray(strips[end, : size[0], : size[1]]), *place)
+    kept, place = said["strips"][end], said["strip_places"][end]
+    return None if kept is None else Texture(Rows.said(kept).unpacked(strips[end]), *place)
