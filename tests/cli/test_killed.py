@@ -136,3 +136,32 @@ def test_a_disk_that_gets_full_is_told_and_the_same_command_goes_on_when_there_i
     assert [path.name for path in (tmp_path / "out").iterdir()] == [STORE]
     _play(longer_capture, tmp_path / "out")
     _require_same(tmp_path / "out", undisturbed)
+
+
+def _own_mounts() -> list[str] | None:
+    """A command before a command, which may then mount disks that nobody else sees; None where that is not allowed."""
+    for before in (["unshare", "--mount"], ["unshare", "--map-root-user", "--mount"]):
+        try:
+            tried = subprocess.run([*before, "mount", "-t", "tmpfs", "tmpfs", "/mnt"], capture_output=True, check=False)
+        except FileNotFoundError:
+            return None
+        if tried.returncode == 0:
+            return before
+    return None
+
+
+def test_a_small_disk_gets_full_and_the_same_command_goes_on_when_it_is_larger(
+    longer_capture: Path, undisturbed: Path, tmp_path: Path
+) -> None:
+    before = _own_mounts()
+    if before is None:
+        pytest.skip("this system lets nobody mount a small disk to try it on")
+    script, copy = Path(__file__).with_name("on_a_small_disk.py"), tmp_path / "copy"
+    command = [*before, sys.executable, str(script), str(longer_capture), str(tmp_path / "disk"), "3", str(copy)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    said = json.loads(done.stdout)
+    assert "No space left" in said["error"]
+    assert said["left"] == [STORE]
+    assert 0 < said["pieces"] < 20
+    _require_same(copy, undisturbed)
