@@ -13,6 +13,9 @@ from typing import Any
 import pytest
 import soundfile
 
+from gramoscope.cli.terminal import Terminal
+from gramoscope.cli.watch import MANY_GROUPS, at_work
+from gramoscope.player.executors import Processes
 from gramoscope.player.reading_store import STORE
 
 
@@ -89,3 +92,22 @@ def test_a_plan_is_told(gramoscope: Callable[..., Any], capture: Path, quickly: 
         assert word in answer.out
     found = json.loads(gramoscope("info", capture, "--plan", "--json", *quickly).out)
     assert found["plan"]["groups"] == found["groups_expected"]
+
+
+@pytest.mark.parametrize(
+    ("executor", "workers", "groups", "expected"),
+    [
+        ("auto", 2, MANY_GROUPS, Processes),
+        ("auto", 2, MANY_GROUPS - 1, None),
+        ("auto", 1, MANY_GROUPS, None),
+        ("auto", 2, 0, None),
+        ("threads", 2, MANY_GROUPS, None),
+        ("processes", 2, 8, Processes),
+    ],
+)
+def test_a_long_film_is_read_by_processes(
+    tmp_path: Path, executor: str, workers: int, groups: int, expected: type | None
+) -> None:
+    terminal = Terminal(quiet=True)
+    with at_work(terminal, tmp_path, executor, None, workers, groups=groups, json_progress=False) as (_, work):
+        assert type(work.executor) is (expected or type(None))

@@ -39,7 +39,7 @@ def play(
     force: bool = False,
     workers: Workers = PROCESSORS,
     device: Literal["cpu", "cuda"] = "cpu",
-    executor: Literal["threads", "processes", "dask"] = "threads",
+    executor: Literal["auto", "threads", "processes", "dask"] = "auto",
     scheduler: str | None = None,
     restart: bool = False,
     keep_reading: bool = False,
@@ -126,7 +126,8 @@ def play(
         checked in CUDA's simulator, not on a card). Both agree to rounding.
     executor
         Who reads: threads, processes, or the workers of Dask (needs `pip install "gramoscope[cluster]"`), on this machine
-        unless --scheduler says where. The result does not depend on it.
+        unless --scheduler says where; auto takes processes for 512 groups or more, which they read sooner than threads. The
+        result does not depend on it.
     scheduler
         Address of a Dask scheduler that runs already, such as tcp://10.0.0.1:8786, whatever started it. Its workers must see
         the capture and DIR under the same paths.
@@ -153,7 +154,7 @@ def play(
 
         return play_again(play, locals())
     from gramoscope.apparatus.opening import opened
-    from gramoscope.cli.watch import at_work
+    from gramoscope.cli.watch import at_work, groups_of
     from gramoscope.errors import ArgumentError
     from gramoscope.player.catalogue import Catalogue
     from gramoscope.player.devices import device_named
@@ -190,8 +191,15 @@ def play(
         device=where,
         groove=groove,
     )
-    how = {"restart": restart, "keep_reading": keep_reading, "verify": verify, "following": following}
-    with at_work(terminal, out, executor, scheduler, workers, json_progress=json_progress, **how) as (progress, work):
+    how: dict[str, Any] = {
+        "groups": groups_of(played) if device == "cpu" else 0,
+        "json_progress": json_progress,
+        "restart": restart,
+        "keep_reading": keep_reading,
+        "verify": verify,
+        "following": following,
+    }
+    with at_work(terminal, out, executor, scheduler, workers, **how) as (progress, work):
         report = play_capture(played, chosen, out, settings, progress=progress, work=work)
     terminal.result(report)
     tell(terminal, report, out)

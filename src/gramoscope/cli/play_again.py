@@ -26,7 +26,7 @@ def play_again(command: Callable[..., int], chosen: Mapping[str, Any]) -> int:
         Option → value; those that say what to do must be left as they are, for the report says it.
     """
     from gramoscope.cli.play import tell
-    from gramoscope.cli.watch import at_work
+    from gramoscope.cli.watch import at_work, groups_of
     from gramoscope.player.again import load_again
     from gramoscope.player.play import play
 
@@ -41,7 +41,8 @@ def play_again(command: Callable[..., int], chosen: Mapping[str, Any]) -> int:
     settings = again.settings(capture, chosen["workers"])
     for name, one in again.other_versions().items():
         terminal.say(f"[yellow]Note:[/] {name} was {one['then']} then, and is {one['now']} now")
-    how = {name: chosen[name] for name in HOW}
+    groups = groups_of(capture) if settings.device.name == "cpu" else 0
+    how = {"groups": groups, **{name: chosen[name] for name in HOW}}
     with at_work(terminal, out, chosen["executor"], chosen["scheduler"], chosen["workers"], **how) as (progress, work):
         repeated = play(capture, again.recipe(), out, settings, progress=progress, judge=again.judged, work=work)
     terminal.result(repeated)

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from gramoscope.apparatus.capture import Capture
 from gramoscope.cli.terminal import Terminal
 from gramoscope.listening.whole_file import temporary_sibling
 from gramoscope.player.executors import Executor, Processes
@@ -18,6 +19,7 @@ from gramoscope.player.following import Following
 from gramoscope.player.kept_reading import Work
 from gramoscope.player.live_meter import LiveMeter
 from gramoscope.player.monitor import Monitor
+from gramoscope.player.reading import AnyCapture
 from gramoscope.player.reading_store import STORE
 from gramoscope.signal_path import WallTrace
 
@@ -34,6 +36,7 @@ def at_work(
     scheduler: str | None,
     workers: int,
     *,
+    groups: int,
     json_progress: bool,
     **how: Any,
 ) -> Iterator[tuple[Shown | None, Work]]:
@@ -44,9 +47,11 @@ def at_work(
     terminal : Terminal
     out : Path
         The transfer's folder.
-    executor : {"threads", "processes", "dask"}
+    executor : {"auto", "threads", "processes", "dask"}
     scheduler : str or None
     workers : int
+    groups : int
+        Of film that wait to be read on the processor; 0 where processes would be of no use.
     json_progress : bool
         In lines of JSON.
     how
@@ -68,7 +73,8 @@ def at_work(
 
     if following is not None:
         told(f"the sound grows in {temporary_sibling(out / 'flat.wav')}")
-    work = Work(_executor(executor, scheduler, workers, told), told=told, watched=looked, **how)
+    chosen = _chosen(executor, workers, groups if following is None else 0)
+    work = Work(_executor(chosen, scheduler, workers, told), told=told, watched=looked, **how)
     try:
         with quiet.progress("Playing") as shown:
             yield watch.shown(_say_now_and_then() if json_progress else shown), work
@@ -144,6 +150,22 @@ def _finite(value: float) -> float | None:
 def _say(values: dict[str, Any]) -> None:
     sys.stderr.write(json.dumps(values) + "\n")
     sys.stderr.flush()
+
+
+MANY_GROUPS = 512
+"""So many are read sooner by processes, which take a few seconds to start, than by threads, which wait for each other's turn
+with the interpreter."""
+
+
+def groups_of(capture: AnyCapture) -> int:
+    """Return how many groups of film a capture has; 0 for photographs."""
+    return capture.group_count if isinstance(capture, Capture) else 0
+
+
+def _chosen(executor: str, workers: int, groups: int) -> str:
+    if executor != "auto":
+        return executor
+    return "processes" if workers > 1 and groups >= MANY_GROUPS else "threads"
 
 
 def _executor(name: str, scheduler: str | None, workers: int, told: Callable[[str], None]) -> Executor | None:

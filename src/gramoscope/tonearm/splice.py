@@ -39,17 +39,24 @@ LEAST_DISSIMILARITY = 0.01
 
 # in whichever order the processor adds fastest
 @numba.njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
-def _row_products(a, y, b, z, shift, start, stop):  # type: ignore[no-untyped-def]
-    """Products of row y of a with row z of b, moved by a shift, and of each with itself."""
-    ab = np.float32(0)
-    aa = np.float32(0)
-    bb = np.float32(0)
-    for x in range(start, stop):
-        p, q = a[y, x], b[z, x - shift]
-        ab += p * q
-        aa += p * p
-        bb += q * q
-    return ab, aa, bb
+def _row_product(a, first, b, other, count):  # type: ignore[no-untyped-def]
+    """Product of a part of one row with a part of another, of strips as one line."""
+    here, there = np.uint64(first), np.uint64(other)
+    total = np.float32(0)
+    for x in range(np.uint64(count)):
+        total += a[here + x] * b[there + x]
+    return total
+
+
+@numba.njit(cache=True, nogil=True)
+def _squares_before(strip, rows, out):  # type: ignore[no-untyped-def]
+    """Write sums of squares of rows up to each column, [row, column + 1]."""
+    for y in rows:
+        total = 0.0
+        out[y, 0] = total
+        for x in range(strip.shape[1]):
+            total += strip[y, x] * strip[y, x]
+            out[y, x + 1] = total
 
 
 @numba.njit(cache=True, nogil=True)
@@ -59,22 +66,30 @@ def correlate_strips(a, b, column_shift, row_shift, least_columns, rows):  # typ
     a[y, x] is compared with b[y − row_shift[i], x − column_shift[j]] where both exist, for y in `rows`; result [i, j] is
     −1 … 1, and 0 where fewer than `least_columns` columns overlap.
     """
-    height = a.shape[0]
+    height, width, other_width = a.shape[0], a.shape[1], b.shape[1]
+    one, other = a.reshape(a.size), b.reshape(b.size)
+    of_a, of_b = np.empty((height, width + 1)), np.empty((len(b), other_width + 1))
+    _squares_before(a, rows, of_a)
+    wanted = np.zeros(len(b), np.bool_)
+    for dy in row_shift:
+        for y in rows:
+            if 0 <= y - dy < len(b):
+                wanted[y - dy] = True
+    _squares_before(b, np.flatnonzero(wanted), of_b)
     out = np.zeros((row_shift.size, column_shift.size))
     for i in range(row_shift.size):
-        dy = row_shift[i]
         for j in range(column_shift.size):
             dx = column_shift[j]
-            start, stop = max(0, dx), min(a.shape[1], b.shape[1] + dx)
+            start, stop = max(0, dx), min(width, other_width + dx)
             if stop - start < least_columns:
                 continue
             ab, aa, bb = 0.0, 0.0, 0.0
             for y in rows:
-                if dy <= y < height + dy:
-                    p, q, r = _row_products(a, y, b, y - dy, dx, start, stop)
-                    ab += p
-                    aa += q
-                    bb += r
+                z = y - row_shift[i]
+                if 0 <= z < min(height, len(b)):
+                    ab += _row_product(one, y * width + start, other, z * other_width + start - dx, stop - start)
+                    aa += of_a[y, stop] - of_a[y, start]
+                    bb += of_b[z, stop - dx] - of_b[z, start - dx]
             if aa > 0 and bb > 0:
                 out[i, j] = ab / np.sqrt(aa * bb)
     return out
