@@ -16,7 +16,7 @@ from gramoscope.signal_path import FrameGroup
 Frame = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
 
 
-EVERY_ROW = 17
+EVERY_ROW = 33
 """Of so many rows one is looked at, which tells enough."""
 
 

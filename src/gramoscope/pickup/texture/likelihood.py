@@ -26,6 +26,7 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
+import numpy.typing as npt
 from scipy import fft
 
 from gramoscope.conventions import BoolArray, Float32Array, FloatArray
@@ -210,10 +211,21 @@ def quiet_power(said: FloatArray, weight: FloatArray) -> tuple[FloatArray, float
     columns : float
         Their ratio estimates J; sums of both over windows may be divided too.
     """
-    length = fft.next_fast_len(2 * weight.size, real=True)
+    spectrum = _quiet_spectrum(said * weight)
+    return np.asarray((spectrum @ spectrum.conj().T).real), float(np.sum(weight**2))
+
+
+def quiet_powers(weighted: FloatArray) -> FloatArray:
+    """Return the power of scores, weighted by what each counts, at frequencies where no sound is: the diagonal of J."""
+    spectrum = _quiet_spectrum(weighted)
+    return np.asarray((spectrum.real**2 + spectrum.imag**2).sum(axis=1))
+
+
+def _quiet_spectrum(weighted: FloatArray) -> npt.NDArray[np.complex128]:
+    """Return the spectra of rows where no sound is, of squares that add up to their mean power there."""
+    length = fft.next_fast_len(2 * weighted.shape[1], real=True)
     low, high = (int(np.ceil(f * length)) for f in QUIET_BAND)
-    spectrum = fft.rfft(said * weight, length)[:, low:high]
-    return np.asarray((spectrum @ spectrum.conj().T).real / (high - low)), float(np.sum(weight**2))
+    return np.asarray(fft.rfft(weighted, length)[:, low:high] / np.sqrt(high - low))
 
 
 TEXTURE_PX = 25

@@ -22,7 +22,7 @@ from gramoscope.pickup.texture.filter_bank import FilterBank
 from gramoscope.pickup.texture.following import channels, follow
 from gramoscope.pickup.texture.hearing import Ear, add_up, clear_columns, ear_of
 from gramoscope.pickup.texture.layout import StripeLayout
-from gramoscope.pickup.texture.likelihood import StripeStatistics, quiet_power
+from gramoscope.pickup.texture.likelihood import StripeStatistics, quiet_powers
 from gramoscope.pickup.texture.smoothing import smooth, smoothed
 from gramoscope.pickup.texture.spectrum import Band, filtered
 from gramoscope.pickup.texture.stretch import Stretch
@@ -156,9 +156,9 @@ def evidence(stretch: Stretch, model: Model, rules: Rules, *, judged: bool = Tru
 
 def _surprise(ear: Ear, said: FloatArray, weight: Float32Array) -> FloatArray:
     surprise = np.zeros((2, 2))
+    power, columns = quiet_powers(said * weight), np.einsum("sx,sx->s", weight, weight, dtype=np.float64)
     for i, wall in enumerate(ear.wall):
-        power, columns = quiet_power(said[i : i + 1], weight[i].astype(np.float64))
-        surprise[wall] += power[0, 0], columns * ear.trust[i] ** 2 * ear.score_power[i]
+        surprise[wall] += power[i], columns[i] * ear.trust[i] ** 2 * ear.score_power[i]
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(surprise[:, 0] / surprise[:, 1])
 
