@@ -113,6 +113,29 @@ def test_a_whole_chunk_in_the_wrong_place_makes_the_piece_unwritten(store: Readi
     assert store.read(0) is None
 
 
+def test_of_strips_only_the_rows_with_texture_are_kept(store: ReadingStore) -> None:
+    rng = np.random.default_rng(8)
+
+    def piece(rows: list[slice]) -> Piece:
+        trace = _trace(rng, 0, 9, (448, 100))
+        assert trace.head is not None
+        strip = np.zeros((448, 100), np.float32)
+        for some in rows:
+            strip[some] = trace.head.strip[some]
+        return Piece(tuple([GroupReading(replace(trace, head=replace(trace.head, strip=strip)))] * 8))
+
+    pieces = [piece([slice(0, 448)]), piece([slice(30, 60), slice(90, 91), slice(440, 448)]), piece([])]
+    for number, one in enumerate(pieces):
+        store.write(number, one)
+        found = store.read(number)
+        assert found is not None
+        assert all(_same(a, b) for a, b in zip(one.groups, found.groups, strict=True))
+    room = [sum(path.stat().st_size for path in (store.root / "strips" / "c" / str(n)).rglob("*")) for n in range(3)]
+    assert room[0] >= 8 * 448 * 100 * 4
+    assert room[1] < 0.2 * room[0]
+    assert room[2] == 0
+
+
 def test_chunks_of_nothing_but_negative_zeros_come_back_as_such(store: ReadingStore) -> None:
     rng = np.random.default_rng(7)
     trace = _trace(rng, 0, 9, (5, 6))
