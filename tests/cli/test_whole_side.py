@@ -14,8 +14,8 @@ import pytest
 import soundfile
 
 from gramoscope.cli.terminal import Terminal
-from gramoscope.cli.watch import MANY_GROUPS, at_work
-from gramoscope.player.executors import Processes
+from gramoscope.cli.watch import at_work
+from gramoscope.player.executors import MANY_GROUPS, Processes, Threads
 from gramoscope.player.reading_store import STORE
 
 
@@ -98,9 +98,9 @@ def test_a_plan_is_told(gramoscope: Callable[..., Any], capture: Path, quickly: 
     ("executor", "workers", "groups", "expected"),
     [
         ("auto", 2, MANY_GROUPS, Processes),
-        ("auto", 2, MANY_GROUPS - 1, None),
-        ("auto", 1, MANY_GROUPS, None),
-        ("auto", 2, 0, None),
+        ("auto", 2, MANY_GROUPS - 1, Threads),
+        ("auto", 1, MANY_GROUPS, Threads),
+        ("auto", 2, 0, Threads),
         ("threads", 2, MANY_GROUPS, None),
         ("processes", 2, 8, Processes),
     ],

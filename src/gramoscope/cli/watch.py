@@ -14,7 +14,7 @@ from typing import Any
 from gramoscope.apparatus.capture import Capture
 from gramoscope.cli.terminal import Terminal
 from gramoscope.listening.whole_file import temporary_sibling
-from gramoscope.player.executors import Executor, Processes
+from gramoscope.player.executors import Executor, Processes, usual_executor
 from gramoscope.player.following import Following
 from gramoscope.player.kept_reading import Work
 from gramoscope.player.live_meter import LiveMeter
@@ -73,8 +73,8 @@ def at_work(
 
     if following is not None:
         told(f"the sound grows in {temporary_sibling(out / 'flat.wav')}")
-    chosen = _chosen(executor, workers, groups if following is None else 0)
-    work = Work(_executor(chosen, scheduler, workers, told), told=told, watched=looked, **how)
+    waiting = groups if following is None else 0
+    work = Work(_executor(executor, scheduler, workers, waiting, told), told=told, watched=looked, **how)
     try:
         with quiet.progress("Playing") as shown:
             yield watch.shown(_say_now_and_then() if json_progress else shown), work
@@ -152,25 +152,18 @@ def _say(values: dict[str, Any]) -> None:
     sys.stderr.flush()
 
 
-MANY_GROUPS = 512
-"""So many are read sooner by processes, which take a few seconds to start, than by threads, which wait for each other's turn
-with the interpreter."""
-
-
 def groups_of(capture: AnyCapture) -> int:
     """Return how many groups of film a capture has; 0 for photographs."""
     return capture.group_count if isinstance(capture, Capture) else 0
 
 
-def _chosen(executor: str, workers: int, groups: int) -> str:
-    if executor != "auto":
-        return executor
-    return "processes" if workers > 1 and groups >= MANY_GROUPS else "threads"
-
-
-def _executor(name: str, scheduler: str | None, workers: int, told: Callable[[str], None]) -> Executor | None:
+def _executor(
+    name: str, scheduler: str | None, workers: int, groups: int, told: Callable[[str], None]
+) -> Executor | None:
     if scheduler is not None or name == "dask":
         from gramoscope.player.cluster import Cluster
 
         return Cluster(scheduler, workers, told)
+    if name == "auto":
+        return usual_executor(workers, groups)
     return Processes(workers) if name == "processes" else None

@@ -143,6 +143,16 @@ class Processes:
             pool.shutdown(wait=True, cancel_futures=True)
 
 
+MANY_GROUPS = 512
+"""So many are read sooner by processes, which take a few seconds to start, than by threads, which wait for each other's turn
+with the interpreter."""
+
+
+def usual_executor(workers: int, groups: int) -> Executor:
+    """Return who reads so many groups of film soonest on this machine."""
+    return Processes(workers) if workers > 1 and groups >= MANY_GROUPS else Threads(workers)
+
+
 class _Hand:
     """One process, started when it is needed."""
 
