@@ -227,7 +227,7 @@ def test_where_texture_tells_little_paths_are_better_when_both_sides_are_heard(
             spread_limit_px=min(noises, 0.8),
         )
         models = [lesson.whole for lesson in learning.learn(noisy, layout, "lateral", RULES, map)]
-        paths = [read(_noisy(another, 1000 * draw + 70 + i), models, "lateral", RULES)[0] for i in range(6)]
+        paths = [read(_noisy(another, 1000 * draw + 70 + i), models, "lateral", RULES)[0] for i in range(16)]
         errors[draw, k] = np.std([(one.displacement_px - true_px(77)).mean(axis=0)[60:-60] for one in paths])
         spreads.append([model.spread_px for model in models])
     # a path settles where the score is zero, and there its noise looks like an answer

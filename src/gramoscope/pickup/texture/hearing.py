@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING
 
 import numba
 import numpy as np
-from scipy import fft
 
 from gramoscope.conventions import INNER, OUTER, BoolArray, Float32Array, FloatArray, IntArray
-from gramoscope.pickup.texture.filter_bank import energies, let_through
 from gramoscope.pickup.texture.following import REACH, TAPS_OF_PHASES, follow_rows, padded_rows, wide_rows
+from gramoscope.pickup.texture.lane_transform import PAIR, fold, let_through, plan_for, transform
 from gramoscope.pickup.texture.layout import StripeLayout, see
 from gramoscope.pickup.texture.likelihood import (
     LOUDNESS_BELL,
@@ -80,9 +79,9 @@ class Ear:
     length: int
 
     @cached_property
-    def in_lanes(self) -> tuple[Float32Array, Float32Array]:
-        """The basis and what is usual, with sixteen channels."""
-        return _in_lanes(self.basis, (2,)), _in_lanes(self.usual, (1, 2))
+    def in_lanes(self) -> tuple[Float32Array, Float32Array, Float32Array]:
+        """The basis, what is usual and the filters, with sixteen channels."""
+        return _in_lanes(self.basis, (2,)), _in_lanes(self.usual, (1, 2)), _in_lanes(self.filters, (3,))
 
 
 def ear_of(
@@ -216,44 +215,80 @@ def _whiten(window, basis, half_taps, usual, white, power):  # type: ignore[no-u
 
 
 @numba.njit(cache=True, nogil=True)
-def _draw(columns, rows, clear, half_px, half_taps, basis, usual, limits, drawn, weight):  # type: ignore[no-untyped-def]
-    """Write the whitened channels of each stripe, times their weight, and the weight."""
+def _draw(columns, row, clear, half_px, half_taps, basis, usual, limits, rooms, drawn, weight):  # type: ignore[no-untyped-def]
+    """Write the whitened channels of a stripe, times their weight, and the weight; columns beyond the picture are black."""
+    window, white, power, valid = rooms
     width = columns.shape[0]
+    follow_rows(columns, row, TAPS_OF_PHASES, half_px + REACH, window[:width])
+    _whiten(window, basis, half_taps, usual, white, power)
+    within(power, TEXTURE_PX // 2, limits[0], limits[1], valid)
+    valid &= clear
+    soften(valid, TAPER, weight)
+    for x in range(width):
+        share = weight[x]
+        for c in range(LANES):
+            drawn[x, c] = white[x, c] * share
+
+
+@numba.njit(cache=True, nogil=True)
+def _energies(answers, lane, sign, score, loudness):  # type: ignore[no-untyped-def]
+    """Write Σ ± p² and Σ p² of filters whose answers lie in neighbouring lanes, their parts exchanged, see `fold`."""
+    for x in range(score.size):
+        first = (x // 2) * PAIR + (1 - x % 2) * LANES + lane
+        some, all_ = np.float32(0), np.float32(0)
+        for k in range(sign.size):
+            energy = answers[first + k] * answers[first + k]
+            some += sign[k] * energy
+            all_ += energy
+        score[x], loudness[x] = some, all_
+
+
+@numba.njit(cache=True, nogil=True)
+def _listen(columns, rows, clear, half_px, ear, plan, first_bin, limits, said, weight):  # type: ignore[no-untyped-def]
+    """One look at all stripes; their filters' answers come back as many at a time as there are lanes."""
+    half_taps, basis, usual, filters, sign, mean, trust = ear
+    radix, twiddle, turn = plan
+    stripes, width, count, m = rows.shape[0], columns.shape[0], sign.shape[1], len(turn) - 1
     padded = -(-width // AT_ONCE) * AT_ONCE
     window, white = np.empty((padded, basis.shape[1]), np.float32), np.empty((padded, LANES), np.float32)
     window[width:] = np.float32(0)
-    power, valid = np.empty(width, np.float32), np.empty(width, np.bool_)
-    for i in range(len(drawn)):
-        drawn[i, width:] = np.float32(0)
-        if not clear[i].any():
-            drawn[i], weight[i] = np.float32(0), np.float32(0)
-            continue
-        follow_rows(columns, rows[i], TAPS_OF_PHASES, half_px + REACH, window[:width])
-        _whiten(window, basis[i], half_taps, usual[i], white, power)
-        within(power, TEXTURE_PX // 2, limits[0], limits[1], valid)
-        valid &= clear[i]
-        soften(valid, TAPER, weight[i])
-        for x in range(width):
-            share = weight[i, x]
-            for c in range(LANES):
-                drawn[i, x, c] = white[x, c] * share
+    rooms = window, white, np.empty(width, np.float32), np.empty(width, np.bool_)
+    drawn = np.zeros((2 * m, LANES), np.float32)
+    one, other, bins = (
+        np.empty(m * PAIR, np.float32),
+        np.empty(m * PAIR, np.float32),
+        np.zeros((m + 1) * PAIR, np.float32),
+    )
+    score, loudness = np.empty(width, np.float32), np.empty(width, np.float32)
+    together = LANES // count
+    for begin in range(0, stripes, together):
+        some = range(begin, min(begin + together, stripes))
+        for i in some:
+            lane = (i - begin) * count
+            if not clear[i].any():
+                weight[i] = np.float32(0)
+                for k in range(m + 1):
+                    bins[k * PAIR + lane : k * PAIR + lane + count] = np.float32(0)
+                    bins[k * PAIR + LANES + lane : k * PAIR + LANES + lane + count] = np.float32(0)
+                continue
+            _draw(columns, rows[i], clear[i], half_px, half_taps, basis[i], usual[i], limits, rooms, drawn, weight[i])
+            where = transform(drawn.reshape(drawn.size), 0, radix, twiddle, one, other)
+            let_through(one if where == 0 else other, turn, filters[i], first_bin, bins, lane)
+        fold(bins, turn, one)
+        back = drawn.reshape(drawn.size)  # which has as much room, and is written anew
+        where = transform(one, 0, radix, twiddle, back, other)
+        for i in some:
+            _energies(back if where == 0 else other, (i - begin) * count, sign[i], score, loudness)
+            temper(score, loudness, LOUDNESS_BELL, TEMPER, said[i])
+            for x in range(width):
+                said[i, x] = (said[i, x] - mean[i]) * trust[i]
+        drawn[width:] = np.float32(0)
 
 
 def _in_lanes(weights: Float32Array, axes: tuple[int, ...]) -> Float32Array:
     """Return weights with sixteen channels along some axes; those that there are not have none."""
     missing = [(0, LANES - size if axis in axes else 0) for axis, size in enumerate(weights.shape)]
     return np.pad(weights, missing) if any(more for _, more in missing) else weights
-
-
-@numba.njit(cache=True, nogil=True)
-def _say(p, sign, mean, trust, said):  # type: ignore[no-untyped-def]
-    stripes, width = said.shape
-    score, loudness = np.empty(width, np.float32), np.empty(width, np.float32)
-    for i in range(stripes):
-        energies(p[i], sign[i], score, loudness)
-        temper(score, loudness, LOUDNESS_BELL, TEMPER, said[i])
-        for x in range(width):
-            said[i, x] = (said[i, x] - mean[i]) * trust[i]
 
 
 @numba.njit(cache=True, nogil=True)
@@ -289,11 +324,18 @@ def heard(
     weight : float32 array, shape (stripe, column)
         0 … 1.
     """
-    drawn = np.empty((len(rows), ear.length, LANES), np.float32)
     weight, said = np.empty(rows.shape, np.float32), np.empty(rows.shape)
-    _draw(columns, rows, clear, ear.half_px, ear.half_taps, *ear.in_lanes, power_limits, drawn, weight)
-    spectrum = fft.rfft(drawn, axis=1)
-    through = np.zeros((len(rows), ear.sign.shape[1], spectrum.shape[1]), np.complex64)
-    let_through(spectrum, ear.filters, ear.band.bins(ear.length).start, through)
-    _say(fft.irfft(through, ear.length), ear.sign, ear.mean_score, ear.trust, said)
+    plan = plan_for(ear.length)
+    _listen(
+        columns,
+        rows,
+        clear,
+        ear.half_px,
+        (ear.half_taps, *ear.in_lanes, ear.sign, ear.mean_score, ear.trust),
+        (plan.radix, plan.twiddle, plan.turn),
+        ear.band.bins(ear.length).start,
+        power_limits,
+        said,
+        weight,
+    )
     return said, weight

@@ -18,7 +18,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import fft
 
 from gramoscope.conventions import FloatArray, IntArray
 from gramoscope.disc.formats import Cut
@@ -26,6 +25,7 @@ from gramoscope.errors import require
 from gramoscope.pickup.cartridge import Spread
 from gramoscope.pickup.texture.following import REACH, wide_rows
 from gramoscope.pickup.texture.hearing import clear_columns
+from gramoscope.pickup.texture.lane_transform import fast_length
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.likelihood import StripeStatistics
 from gramoscope.pickup.texture.reading import Model, Rules, evidence, step
@@ -140,7 +140,7 @@ class Learning:
         """
         band = Band(self.band_low, self.band_high)
         width = max(stretch.columns.shape[0] for stretch in stretches)
-        length = fft.next_fast_len(width + self.largest_lag_px, real=True)
+        length = fast_length(width + self.largest_lag_px)
         level = mean_level([stretch.columns for stretch in stretches])
         tones = [Tone(level, compression) for compression in self.compressions]
         toned = [Model(layout, tone, np.ones(1), self.half_px, band, length, ()) for tone in tones]

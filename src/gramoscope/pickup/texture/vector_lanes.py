@@ -8,6 +8,7 @@ in numbers, for making views costs as much as the work; all lengths are in numbe
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -68,6 +69,14 @@ class _Writer:
         kind = ir.FunctionType(_VECTOR, [_VECTOR] * 3)
         call = self.builder.module.declare_intrinsic(f"llvm.fmuladd.v{LANES}f32", fnty=kind)
         return self.builder.call(call, [one, other, more])
+
+    def less(self, from_: Value, one: Value, other: Value) -> Value:
+        """The product of two vectors, taken off one more."""
+        return self.times_and(self.builder.fsub(self.constant(0.0), one), other, from_)
+
+    def constant(self, value: float) -> Value:
+        """One number, known beforehand, in all places of a vector."""
+        return ir.Constant(_VECTOR, [value] * LANES)
 
     def total(self, vector: Value) -> Value:
         """The sum of a vector, halves first."""
@@ -175,6 +184,144 @@ def _power(w: _Writer) -> None:
         vector = w.builder.load(room)
         total = w.total(w.builder.fmul(vector, vector))
         w.builder.store(total, w.builder.gep(out, [w.plus(place, k)]))
+
+
+def _butterfly(radix: int) -> Callable[[_Writer], None]:
+    """Transforms of so many complex lanes, with their twiddles, for many neighbours; see `lane_transform`."""
+
+    def write(w: _Writer) -> None:
+        source, here, far, twiddle, place, target, there, near, count = w.arguments
+        turns = [[w.spread(twiddle, w.plus(place, 2 * k + part)) for part in (0, 1)] for k in range(radix - 1)]
+
+        def neighbour(q: Value) -> None:
+            step = w.times(q, 2 * LANES)
+            first, into = w.plus(here, step), w.plus(there, step)
+            seen = []
+            for j in range(radix):
+                at = w.plus(first, w.times(far, j)) if j else first
+                seen.append((w.load(source, at), w.load(source, w.plus(at, LANES))))
+            for k, (real, imaginary) in enumerate(_transformed(w, seen)):
+                at = w.plus(into, w.times(near, k)) if k else into
+                if k:
+                    cosine, sine = turns[k - 1]
+                    real, imaginary = (
+                        w.less(w.builder.fmul(real, cosine), imaginary, sine),
+                        w.times_and(real, sine, w.builder.fmul(imaginary, cosine)),
+                    )
+                w.store(real, target, at)
+                w.store(imaginary, target, w.plus(at, LANES))
+
+        w.loop(count, neighbour)
+
+    return write
+
+
+Complex = tuple[Value, Value]
+
+
+def _transformed(w: _Writer, seen: list[Complex]) -> list[Complex]:
+    """The transform of a few complex vectors."""
+    if len(seen) == 2:
+        return [_sum(w, seen[0], seen[1]), _difference(w, seen[0], seen[1])]
+    if len(seen) == 4:
+        even_ones, odd_ones = _transformed(w, seen[0::2]), _transformed(w, seen[1::2])
+        pairs = list(zip(even_ones, [odd_ones[0], _turned(w, odd_ones[1])], strict=True))
+        return [_sum(w, *pair) for pair in pairs] + [_difference(w, *pair) for pair in pairs]
+    n = len(seen)
+    sums = [_sum(w, seen[j], seen[n - j]) for j in range(1, n // 2 + 1)]
+    differences = [_difference(w, seen[j], seen[n - j]) for j in range(1, n // 2 + 1)]
+    total = seen[0]
+    for one in sums:
+        total = _sum(w, total, one)
+    out: list[Complex] = [total] + [seen[0]] * (n - 1)
+    for k in range(1, n // 2 + 1):
+        even, odd = seen[0], (w.constant(0.0), w.constant(0.0))
+        for j, (both, apart) in enumerate(zip(sums, differences, strict=True), start=1):
+            cosine, sine = (w.constant(f(2 * math.pi * j * k / n)) for f in (math.cos, math.sin))
+            even = (w.times_and(cosine, both[0], even[0]), w.times_and(cosine, both[1], even[1]))
+            odd = (w.times_and(sine, apart[0], odd[0]), w.times_and(sine, apart[1], odd[1]))
+        turned = _turned(w, odd)
+        out[k], out[n - k] = _sum(w, even, turned), _difference(w, even, turned)
+    return out
+
+
+def _turned(w: _Writer, one: Complex) -> Complex:
+    """A complex vector times −i."""
+    return one[1], w.builder.fsub(w.constant(0.0), one[0])
+
+
+def _sum(w: _Writer, one: Complex, other: Complex) -> Complex:
+    return w.builder.fadd(one[0], other[0]), w.builder.fadd(one[1], other[1])
+
+
+def _difference(w: _Writer, one: Complex, other: Complex) -> Complex:
+    return w.builder.fsub(one[0], other[0]), w.builder.fsub(one[1], other[1])
+
+
+def _weighing(w: _Writer) -> None:
+    z, here, there, turn, place, weights, begin, count, out, into = w.arguments
+    b, half = w.builder, w.constant(0.5)
+    one, other = ((w.load(z, at), w.load(z, w.plus(at, LANES))) for at in (here, there))
+    cosine, sine = w.spread(turn, place), w.spread(turn, w.plus(place, 1))
+    even = (b.fadd(one[0], other[0]), b.fsub(one[1], other[1]))
+    odd = (b.fadd(one[1], other[1]), b.fsub(other[0], one[0]))
+    real = b.fmul(half, w.times_and(sine, odd[1], w.times_and(cosine, odd[0], even[0])))
+    imaginary = b.fmul(half, w.less(w.times_and(cosine, odd[1], even[1]), sine, odd[0]))
+
+    def weigh(k: Value) -> None:
+        weight = w.load(weights, w.plus(begin, w.times(k, LANES)))
+        for part, first in ((real, 0), (imaginary, LANES)):
+            b.store(w.total(b.fmul(weight, part)), b.gep(out, [w.plus(w.plus(into, k), first)]))
+
+    w.loop(count, weigh)
+
+
+def _folding(w: _Writer) -> None:
+    bins, here, there, turn, place, z, into = w.arguments
+    b = w.builder
+    one, other = ((w.load(bins, at), w.load(bins, w.plus(at, LANES))) for at in (here, there))
+    cosine, sine = w.spread(turn, place), w.spread(turn, w.plus(place, 1))
+    even = (b.fadd(one[0], other[0]), b.fsub(one[1], other[1]))
+    apart = (b.fsub(one[0], other[0]), b.fadd(one[1], other[1]))
+    odd = (w.less(b.fmul(cosine, apart[0]), sine, apart[1]), w.times_and(sine, apart[0], b.fmul(cosine, apart[1])))
+    w.store(b.fadd(even[1], odd[0]), z, into)
+    w.store(b.fsub(even[0], odd[1]), z, w.plus(into, LANES))
+
+
+@_compiled
+def weigh_bin(_, z, here, there, turn, place, weights, begin, count, out, into):  # type: ignore[no-untyped-def]
+    """Write sums over sixteen rows by some weights, of a bin that is in two places of `lane_transform.transform`."""
+    return _function((z, here, there, turn, place, weights, begin, count, out, into), _weighing)
+
+
+@_compiled
+def fold_bin(_, bins, here, there, turn, place, z, into):  # type: ignore[no-untyped-def]
+    """Write twice what `lane_transform.fold` says of a bin."""
+    return _function((bins, here, there, turn, place, z, into), _folding)
+
+
+@_compiled
+def halves(_, source, here, far, twiddle, place, target, there, near, count):  # type: ignore[no-untyped-def]
+    """Transform pairs of complex lanes, `far` apart, into pairs `near` each other, for `count` neighbours."""
+    return _function((source, here, far, twiddle, place, target, there, near, count), _butterfly(2))
+
+
+@_compiled
+def thirds(_, source, here, far, twiddle, place, target, there, near, count):  # type: ignore[no-untyped-def]
+    """Transform threes, as `halves` does pairs."""
+    return _function((source, here, far, twiddle, place, target, there, near, count), _butterfly(3))
+
+
+@_compiled
+def quarters(_, source, here, far, twiddle, place, target, there, near, count):  # type: ignore[no-untyped-def]
+    """Transform fours, as `halves` does pairs."""
+    return _function((source, here, far, twiddle, place, target, there, near, count), _butterfly(4))
+
+
+@_compiled
+def fifths(_, source, here, far, twiddle, place, target, there, near, count):  # type: ignore[no-untyped-def]
+    """Transform fives, as `halves` does pairs."""
+    return _function((source, here, far, twiddle, place, target, there, near, count), _butterfly(5))
 
 
 @_compiled
