@@ -85,11 +85,10 @@ def column_places(
     # the step has taken noise along where the profile is steep; likeness is judged where it is not
     flat = np.abs(profile.gradient) < FLAT * np.abs(profile.gradient).max()
     beside = np.where(flat & kept, steps.own(kept), 0.0)
-    if settled:
-        variance = steps.variance(steps.covariance) * _strangeness(steps.after, kept, steps.covariance)
-    else:
-        alike = toeplitz(likeness(beside.T, rest.shape[1]))
-        variance = steps.variance(alike + steps.covariance - np.eye(rest.shape[1]))
+    errors = steps.covariance
+    if not settled:
+        errors = errors + toeplitz(likeness(beside.T, rest.shape[1])) - np.eye(rest.shape[1])
+    variance = steps.variance(errors) * _strangeness(steps.after, kept, steps.covariance)
     return ColumnPlaces(steps.step, np.where(steps.gain > 0, variance, np.inf), steps.lost, likeness(beside), kept)
 
 
