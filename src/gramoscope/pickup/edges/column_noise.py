@@ -68,7 +68,7 @@ def seen_covariance(rest: FloatArray, kept: BoolArray) -> FloatArray:
     alike = (1 - SHRUNK) * raw / np.outer(strength, strength)
     np.fill_diagonal(alike, 1.0)
     value, vector = np.linalg.eigh(alike)
-    return (vector * np.maximum(value, LEAST_EIGENVALUE)) @ vector.T * np.outer(strength, strength)
+    return np.asarray((vector * np.maximum(value, LEAST_EIGENVALUE)) @ vector.T * np.outer(strength, strength))
 
 
 def patchy_covariance(rest: FloatArray, kept: BoolArray, patterns: FloatArray, away: BoolArray) -> FloatArray:

@@ -143,7 +143,7 @@ def _strangeness(after: FloatArray, kept: BoolArray, covariance: FloatArray) -> 
     free = np.maximum(kept.sum(axis=1) - 1, 1)
     squares = (filtered(covariance, kept, after) * after).sum(axis=1) / free
     usual = float(np.median(squares[kept.any(axis=1)])) if kept.any() else 1.0
-    return np.maximum(squares / max(usual, 1e-12), 1.0)
+    return np.asarray(np.maximum(squares / max(usual, 1e-12), 1.0))
 
 
 def _first_noise(band: EdgeBand, rest: FloatArray, kept: BoolArray) -> FloatArray:
