@@ -93,6 +93,23 @@ def test_800_hz_on_one_wall_and_3000_hz_on_the_other(micrograph: Make, picture_o
         assert abs(np.angle(leak)) < 0.6
 
 
+def test_the_line_along_the_bottom_is_found_where_it_is_seen_and_swings_as_the_walls_do(
+    micrograph: Make, picture_of: Make
+) -> None:
+    grooves = CARTRIDGE.find(picture_of(micrograph("track_05")))
+    seen = np.array([np.isfinite(groove.bottom_row_px).mean() for groove in grooves])
+    # in the others the bottom is dim and as broad as half the wall
+    assert (seen > 0).tolist() == [False] * 5 + [True]
+    assert seen[5] > 0.8
+    column = np.flatnonzero(np.isfinite(grooves[5].bottom_row_px))
+    bottom = (column.astype(float), grooves[5].bottom_row_px[column], grooves[5].bottom_row_sigma_px[column])
+    rate = _rate(_places(grooves[5], INNER), 1 / 200, 1 / 150)
+    (tone,), explained = _fit(bottom, rate)
+    (wall,), _ = _fit(_places(grooves[5], INNER), rate)
+    assert explained > 0.9
+    assert abs(tone / wall - 1) < 0.2
+
+
 def test_writing_and_dust_at_full_scale_get_no_weight(micrograph: Make, picture_of: Make) -> None:
     image = micrograph("track_05")
     for groove in CARTRIDGE.find(picture_of(image)):
