@@ -26,7 +26,8 @@ NOISE_COLUMNS = 20.0
 """Standard deviation of the window, in columns, over which the strength of the noise is averaged."""
 LEAST_NOISE = 1e-3
 """Noise is never taken for less than this share of the range of grey levels in the band."""
-
+NARROW = 11
+"""In bands of no more rows a neighbouring edge shows too: its motion is no error that pixels share, and each counts alone."""
 FLAT = 0.2
 """Share of the steepest gradient below which a profile counts as flat."""
 
@@ -88,7 +89,9 @@ def column_places(
     errors = steps.covariance
     if not settled:
         errors = errors + toeplitz(likeness(beside.T, rest.shape[1])) - np.eye(rest.shape[1])
-    variance = steps.variance(errors) * _strangeness(steps.after, kept, steps.covariance)
+    variance = steps.variance(errors)
+    if rest.shape[1] > NARROW:
+        variance = variance * _strangeness(steps.after, kept, steps.covariance)
     return ColumnPlaces(steps.step, np.where(steps.gain > 0, variance, np.inf), steps.lost, likeness(beside), kept)
 
 
@@ -123,7 +126,9 @@ def _steps(
 ) -> _Steps:
     """The step of each column, by generalised least squares (`column_noise`); specks that are kept pull little."""
     rest, gradient = rest / noise, profile.gradient / noise
-    if settled:
+    if rest.shape[1] <= NARROW:
+        covariance = np.eye(rest.shape[1])
+    elif settled:
         covariance = seen_covariance(rest, kept)
     else:
         place = np.arange(rest.shape[1]) - (rest.shape[1] - 1) / 2
