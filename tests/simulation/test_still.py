@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from gramoscope.apparatus.still import open_stills
+from gramoscope.pickup.edges.edge_cartridge import EdgeCartridge
+from gramoscope.signal_path import StillPicture
 from gramoscope.simulation.passage import Passage
 from gramoscope.simulation.still import (
     StillScene,
@@ -106,3 +108,17 @@ def test_a_disc_is_the_still_rolled_up(passage: Passage) -> None:
             seen = picture[round(250 + down * (radius - row)), round(260 + right * (radius - row))]
             near = flat[row - 1 : row + 2, column - 2 : column + 3] if column else flat[row - 1 : row + 2, :3]
             assert near.min() - 4 <= seen <= near.max() + 4
+
+
+@pytest.mark.parametrize("bottom", [0.5, 0.05])
+def test_the_line_along_the_bottom_runs_half_way_between_the_edges(passage: Passage, bottom: float) -> None:
+    scene = replace(PLAIN, bottom=bottom, noise=1.0, grain=0.01)
+    picture = still_picture(scene, passage, 0, scene.turn_px)
+    still = StillPicture(0, picture, 0.0, 0.0, scene.pixel_pitch_m, 255, np.ones(picture.shape, np.bool_))
+    grooves = EdgeCartridge().find(still)
+    for turn, groove in enumerate(grooves[: scene.turns]):
+        middle = np.mean(edges_of_turn(scene, passage, turn, np.arange(scene.turn_px)), axis=0)
+        seen = np.isfinite(groove.bottom_row_px)
+        assert seen.mean() > 0.9
+        assert np.abs(groove.bottom_row_px - middle)[seen].max() < 0.5
+    assert len(grooves) >= scene.turns

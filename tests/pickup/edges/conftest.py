@@ -24,7 +24,9 @@ class Photograph:
 
     The grooves lie `pitch_px` apart, the first one `first_px` from the upper border, and are `width_px` wide; each edge
     swings by its own tone. Land has the level `land`, walls `wall`; the light falls off along and across; noise has the
-    standard deviation `noise`, more on the land by `land_noise`, and is made alike over `noise_blur_px`.
+    standard deviation `noise`, more on the land by `land_noise`, and is made alike over `noise_blur_px`. Along the bottom,
+    half way between the edges, runs a line that is brighter than the walls by `bottom`, a Gaussian of standard deviation
+    `bottom_px`.
     """
 
     rows: int = 300
@@ -43,6 +45,8 @@ class Photograph:
     period_px: float = 80.0
     light: float = 0.0
     line: float = 0.0
+    bottom: float = 0.0
+    bottom_px: float = 1.5
     seed: int = 7
 
     def edges(self) -> FloatArray:
@@ -61,12 +65,13 @@ class Photograph:
         """Grey levels without noise."""
         row = np.arange(self.rows)[:, None]
         inside = np.zeros((self.rows, self.columns))
-        lines = np.zeros((self.rows, self.columns))
+        lines, lines_of_bottom = np.zeros((2, self.rows, self.columns))
         for outer, inner in ((edge[OUTER], edge[INNER]) for edge in self.edges()):
             inside += ndtr((row - outer) / self.blur_px) - ndtr((row - inner) / self.blur_px)
+            lines_of_bottom += np.exp(-0.5 * ((row - 0.5 * (outer + inner)) / self.bottom_px) ** 2)
             for edge in (outer, inner):
                 lines += np.exp(-0.5 * ((row - edge) / self.blur_px) ** 2)
-        level = self.land + (self.wall - self.land) * inside + self.line * lines
+        level = self.land + (self.wall - self.land) * inside + self.line * lines + self.bottom * lines_of_bottom
         fall = 1 - self.light * (row / self.rows + np.arange(self.columns) / self.columns) / 2
         return level * fall
 

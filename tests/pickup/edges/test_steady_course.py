@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 
-from gramoscope.pickup.edges.steady_course import ORDER, steady_course
+from gramoscope.pickup.edges.steady_course import ORDER, left_by_course, steady_course
 
 
 def test_the_course_and_its_variance_are_those_of_the_dense_matrix() -> None:
@@ -57,3 +58,16 @@ def test_a_gap_is_bridged_with_a_larger_error() -> None:
     course = steady_course(row, weight)
     assert course.variance[205] > 4 * course.variance[100]
     assert (np.abs(course.row - true)[190:220] < 4 * np.sqrt(course.variance[190:220])).all()
+
+
+@pytest.mark.parametrize(("blur", "stiffness"), [(0.0, 3.0), (0.0, 1e4), (1.0, 30.0), (2.0, 1e3)])
+def test_what_a_course_leaves_of_errors_is_what_is_left(blur: float, stiffness: float) -> None:
+    errors = np.random.default_rng(4).standard_normal(30_000)
+    alike = np.zeros(12)
+    alike[0] = 1.0
+    if blur:
+        errors = gaussian_filter1d(errors, blur)
+        errors /= errors.std()
+        alike = np.exp(-(np.arange(12.0) ** 2) / (4 * blur**2))
+    left = errors - steady_course(errors, np.ones(errors.size), stiffness=stiffness).row
+    assert left_by_course(alike, 1.0, stiffness) == pytest.approx(np.mean(left**2), rel=0.05)

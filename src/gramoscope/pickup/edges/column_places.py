@@ -1,12 +1,11 @@
 """What every column of a band says of the place of its edge, and how well: least squares, column by column.
 
-With r the pixels less the profile, g the gradient of the profile with the place of the edge, σ² the noise and kept the
-pixels that count,
+With r the pixels less the profile and g the gradient of the profile with the place of the edge, of the pixels that count,
 
-    δ = Σ g r/σ² / Σ g²/σ²,        var δ = Σ_ij a_i a_j σ_i σ_j ρ(i − j),    a = g/σ² / Σ g²/σ²,
+    δ = a'r,        var δ = a'Σ a,        a = Σ⁻¹ g / g'Σ⁻¹ g,
 
-where ρ is the likeness of the noise from row to row. What a pixel must not differ by, is counted after the step δ has been
-taken: an edge that has moved is no dust.
+where Σ is the covariance of the errors of pixels (`column_noise`). What a pixel must not differ by, is counted after the
+step δ has been taken: an edge that has moved is no dust.
 """
 
 from __future__ import annotations
@@ -14,18 +13,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import toeplitz
 from scipy.ndimage import binary_dilation
 
 from gramoscope.conventions import BoolArray, FloatArray
+from gramoscope.pickup.edges.column_noise import filtered, patch_patterns, patchy_covariance, seen_covariance
 from gramoscope.pickup.edges.edge_band import EdgeBand
-from gramoscope.pickup.edges.edge_profile import KNOT_PX, EdgeProfile, along, binned
+from gramoscope.pickup.edges.edge_profile import AWAY_PX, KNOT_PX, SOFT_STEP_PX, EdgeProfile, along, binned
 from gramoscope.pickup.edges.likeness import likeness
 
 NOISE_COLUMNS = 20.0
 """Standard deviation of the window, in columns, over which the strength of the noise is averaged."""
 LEAST_NOISE = 1e-3
 """Noise is never taken for less than this share of the range of grey levels in the band."""
-
+NARROW = 11
+"""In bands of no more rows a neighbouring edge shows too: its motion is no error that pixels share, and each counts alone."""
 FLAT = 0.2
 """Share of the steepest gradient below which a profile counts as flat."""
 
@@ -74,31 +76,79 @@ def column_places(
     """
     rest = band.level - profile.expected
     noise = _first_noise(band, rest, kept)
-    step, _, _ = _steps(rest, profile.gradient, noise, kept)
+    steps = _steps(rest, band, profile, noise, kept, settled=settled)
     for _ in range(2):
-        after = rest - profile.gradient * step[:, None]
-        dust = band.usable & (np.abs(after) > dust_gate * noise)
+        own = noise * steps.own(kept)
+        dust = band.usable & (np.abs(own) > dust_gate * noise)
         kept = band.usable & ~binary_dilation(dust, np.ones((3, 3), np.bool_))
-        noise = _noise(band, rest if settled else after, 0.0 if settled else profile.gradient, noise, kept)
-        step, gain, whole = _steps(rest, profile.gradient, noise, kept)
-    after = np.where(kept, (rest - profile.gradient * step[:, None]) / noise, 0.0)
+        noise = _noise(band, rest if settled else own, 0.0 if settled else profile.gradient, noise, kept)
+        steps = _steps(rest, band, profile, noise, kept, settled=settled)
     # the step has taken noise along where the profile is steep; likeness is judged where it is not
-    beside = np.where(np.abs(profile.gradient) < FLAT * np.abs(profile.gradient).max(), after, 0.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = kept * profile.gradient / noise / gain[:, None]
-        lost = np.where(whole > 0, 1 - gain / whole, 1.0)
-        variance = np.where(gain > 0, _variance(np.where(gain[:, None] > 0, share, 0.0), likeness(beside.T)), np.inf)
-    return ColumnPlaces(step, variance, lost, likeness(beside), kept)
+    flat = np.abs(profile.gradient) < FLAT * np.abs(profile.gradient).max()
+    beside = np.where(flat & kept, steps.own(kept), 0.0)
+    errors = steps.covariance
+    if not settled:
+        errors = errors + toeplitz(likeness(beside.T, rest.shape[1])) - np.eye(rest.shape[1])
+    variance = steps.variance(errors)
+    if rest.shape[1] > NARROW:
+        variance = variance * _strangeness(steps.after, kept, steps.covariance)
+    return ColumnPlaces(steps.step, np.where(steps.gain > 0, variance, np.inf), steps.lost, likeness(beside), kept)
+
+
+@dataclass(frozen=True, eq=False)
+class _Steps:
+    """Steps of all columns, what they rest on, and the covariance that they were weighed by, in units of the noise."""
+
+    step: FloatArray
+    share: FloatArray
+    gain: FloatArray
+    whole: FloatArray
+    after: FloatArray
+    covariance: FloatArray
+    patchy: bool
+
+    def own(self, kept: BoolArray) -> FloatArray:
+        """What is left of each pixel after the step, without the patterns that come and go."""
+        return filtered(self.covariance, kept, self.after) if self.patchy else self.after
+
+    @property
+    def lost(self) -> FloatArray:
+        """Share of the information that is not kept."""
+        return np.where(self.whole > 0, 1 - self.gain / np.where(self.whole > 0, self.whole, 1.0), 1.0)
+
+    def variance(self, covariance: FloatArray) -> FloatArray:
+        """Of the steps, by the covariance of the pixels."""
+        return np.asarray(((self.share @ covariance) * self.share).sum(axis=1))
 
 
 def _steps(
-    rest: FloatArray, gradient: FloatArray, noise: FloatArray, kept: BoolArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The step of each column, and the information of what is kept and of all; specks that are kept pull little."""
-    information = (gradient / noise) ** 2
-    gain, whole = (information * kept).sum(axis=1), information.sum(axis=1)
-    pull = (kept * gradient * rest / noise**2).sum(axis=1)
-    return np.where(gain > 0, pull / np.where(gain > 0, gain, 1.0), 0.0), gain, whole
+    rest: FloatArray, band: EdgeBand, profile: EdgeProfile, noise: FloatArray, kept: BoolArray, *, settled: bool
+) -> _Steps:
+    """The step of each column, by generalised least squares (`column_noise`); specks that are kept pull little."""
+    rest, gradient = rest / noise, profile.gradient / noise
+    if rest.shape[1] <= NARROW:
+        covariance = np.eye(rest.shape[1])
+    elif settled:
+        covariance = seen_covariance(rest, kept)
+    else:
+        place = np.arange(rest.shape[1]) - (rest.shape[1] - 1) / 2
+        bright = np.mean(profile.light[:, None] / noise, axis=0)
+        patterns = bright[:, None] * patch_patterns(place, SOFT_STEP_PX)
+        covariance = patchy_covariance(rest, kept, patterns, np.abs(place) > AWAY_PX)
+    pull = filtered(covariance, kept, gradient)
+    gain = (pull * gradient).sum(axis=1)
+    whole = (filtered(covariance, np.ones_like(kept), gradient) * gradient).sum(axis=1)
+    share = np.where(gain[:, None] > 0, pull / np.where(gain > 0, gain, 1.0)[:, None], 0.0)
+    step = (share * rest).sum(axis=1)
+    return _Steps(step, share, gain, whole, rest - gradient * step[:, None], covariance, patchy=not settled)
+
+
+def _strangeness(after: FloatArray, kept: BoolArray, covariance: FloatArray) -> FloatArray:
+    """How many times more than usual a column differs from the profile, squared; at least 1."""
+    free = np.maximum(kept.sum(axis=1) - 1, 1)
+    squares = (filtered(covariance, kept, after) * after).sum(axis=1) / free
+    usual = float(np.median(squares[kept.any(axis=1)])) if kept.any() else 1.0
+    return np.asarray(np.maximum(squares / max(usual, 1e-12), 1.0))
 
 
 def _first_noise(band: EdgeBand, rest: FloatArray, kept: BoolArray) -> FloatArray:
@@ -134,12 +184,3 @@ def _at_places(band: EdgeBand, knots: FloatArray, half_px: float) -> FloatArray:
     smooth = np.convolve(np.pad(knots, 2, mode="edge"), np.array([1, 2, 3, 2, 1]) / 9, mode="valid")
     floor = LEAST_NOISE * max(float(np.ptp(band.level)), 1.0)
     return np.maximum(np.interp(band.from_edge_px, np.arange(knots.size) * KNOT_PX - half_px, smooth), floor)
-
-
-def _variance(share: FloatArray, rho: FloatArray) -> FloatArray:
-    """Variance of sums of noise in units of itself, with shares, shape (column, place)."""
-    total = (share**2).sum(axis=1)
-    for lag in range(1, rho.size):
-        if rho[lag] > 0:
-            total = total + 2 * rho[lag] * (share[:, lag:] * share[:, :-lag]).sum(axis=1)
-    return np.asarray(np.maximum(total, 0.0))

@@ -2,18 +2,19 @@
 
 First coarsely: how far apart grooves are (`groove_pitch`), what speaks for an edge at each place (`step_evidence`), the
 paths that collect most of it (`courses`) and which of them are the edges of grooves (`groove_choice`). Then each edge on
-its own, to a fraction of a pixel (`sharpening`).
+its own, to a fraction of a pixel (`sharpening`), and the line along the bottom where there is one (`bottom_line`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from gramoscope.conventions import INNER, OUTER
 from gramoscope.errors import require
 from gramoscope.pickup.edges.appearance import Appearance
+from gramoscope.pickup.edges.bottom_line import bottom_line
 from gramoscope.pickup.edges.courses import Course, find_courses
 from gramoscope.pickup.edges.groove_choice import CoarseGroove, choose_grooves
 from gramoscope.pickup.edges.groove_pitch import groove_pitches_px
@@ -86,8 +87,15 @@ class EdgeCartridge:
         for groove in grooves:
             sharp = self._sharpened(picture, groove, half_px, burnt)
             if any(edge is not None for edge in sharp):
-                found.append(_groove_edges(len(found), sharp, columns))
+                edges = _groove_edges(len(found), sharp, columns)
+                found.append(self._with_bottom(edges, picture, half_px, burnt))
         return tuple(found)
+
+    def _with_bottom(self, edges: GrooveEdges, picture: StillPicture, half_px: int, burnt: int) -> GrooveEdges:
+        row_px, sigma_px = bottom_line(
+            picture, edges.row_px, sharpening=self.sharpening, half_px=half_px, burnt=burnt, least_seen=self.least_seen
+        )
+        return replace(edges, bottom_row_px=row_px, bottom_row_sigma_px=sigma_px)
 
     def coarse(self, picture: StillPicture, burnt: int) -> tuple[list[CoarseGroove], float]:
         """Return the coarse courses of the edges of every groove, a place a column, and the pitch in rows."""
@@ -112,7 +120,7 @@ class EdgeCartridge:
             margin_px=round(MARGIN_SHARE * pitch_px),
             most=int(EDGES_A_PITCH * rows / pitch_px) + SPARE_COURSES,
         )
-        return choose_grooves(courses, lines=self.appearance is Appearance.BRIGHT_LINES)
+        return choose_grooves(courses, pitch_px=pitch_px, lines=self.appearance is Appearance.BRIGHT_LINES)
 
     def _sharpened(
         self, picture: StillPicture, groove: CoarseGroove, half_px: int, burnt: int

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gramoscope.conventions import INNER, OUTER
+from gramoscope.conventions import INNER, OUTER, FloatArray
 from gramoscope.pickup.edges.courses import Course
 
 CHANCE, CERTAINTY = 2.0, 2.8
@@ -21,6 +21,15 @@ LEAST_GAP = 0.1
 """A narrower gap, in standard deviations of the evidence, tells nothing from nothing."""
 HALF_GROOVE, WHOLE_GROOVE = 0.7, 0.25
 """Two neighbours narrower than this share of the usual width, and as wide together but for this share, are one groove."""
+
+WIDTH_SHARES = (0.2, 0.8)
+"""Grooves are as wide as this share of the pitch."""
+MOST_UNEVEN = 1.4
+"""No groove, and no land, is wider or narrower than usual by more than this factor."""
+NEARLY_MOST = 0.85
+"""Chains of edges that collect this share of what the best one does are as good."""
+FEWEST_EVEN, MOST_OF_SPAN = 5, 0.8
+"""Edges evenly spaced are so many at least, and go over this share of the rows over which there are edges at all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +72,54 @@ def taking_turns(courses: Sequence[Course], least: float) -> list[Course]:
     return max(best.values(), key=lambda chain: chain[0])[1]
 
 
+def evenly_spaced(courses: Sequence[Course], least: float, pitch_px: float) -> list[Course]:
+    """Return the courses that take turns between the walls, at distances that repeat, and collect most above the least.
+
+    A line along the bottom is an edge to either side, and may collect as much as the edges at the land do. But grooves lie
+    a pitch apart and are equally wide; and if halves of grooves do as well as whole ones, the whole ones are meant.
+
+    Parameters
+    ----------
+    courses : sequence of Course
+    least : float
+        What a course must collect to be worth taking.
+    pitch_px : float
+        From groove to groove.
+    """
+    ordered = sorted((one for one in courses if one.evidence > least), key=lambda course: float(np.median(course.row)))
+    place = np.array([float(np.median(course.row)) for course in ordered])
+    widths = {
+        float(place[j] - place[i])
+        for i, one in enumerate(ordered)
+        for j, other in enumerate(ordered[i + 1 :], i + 1)
+        if one.wall == OUTER
+        and other.wall == INNER
+        and WIDTH_SHARES[0] < (place[j] - place[i]) / pitch_px < WIDTH_SHARES[1]
+    }
+    tried = [(width, *_chain(ordered, place, least, width, pitch_px - width)) for width in sorted(widths)]
+    most = max((value for _, value, _ in tried), default=0.0)
+    good = [(width, chain) for width, value, chain in tried if value > NEARLY_MOST * most]
+    return max(good, key=lambda found: found[0])[1] if good else []
+
+
+def _chain(
+    ordered: Sequence[Course], place: FloatArray, least: float, width_px: float, land_px: float
+) -> tuple[float, list[Course]]:
+    """The best chain of edges whose grooves and lands are about so wide, and what it collects above the least."""
+    best: list[tuple[float, list[Course]]] = []
+    for number, course in enumerate(ordered):
+        usual_px = width_px if course.wall == INNER else land_px
+        before = [
+            best[earlier]
+            for earlier in range(number)
+            if ordered[earlier].wall != course.wall
+            and 1 / MOST_UNEVEN < (place[number] - place[earlier]) / usual_px < MOST_UNEVEN
+        ]
+        value, chain = max(before, key=lambda found: found[0], default=(0.0, []))
+        best.append((value + course.evidence - least, [*chain, course]))
+    return max(best, key=lambda found: found[0], default=(0.0, []))
+
+
 def pair(edges: Sequence[Course]) -> list[CoarseGroove]:
     """Return the grooves that edges, taking turns by growing row, make: each an outer edge and the inner one after it.
 
@@ -81,12 +138,14 @@ def pair(edges: Sequence[Course]) -> list[CoarseGroove]:
     return grooves
 
 
-def choose_grooves(courses: Sequence[Course], *, lines: bool = False) -> list[CoarseGroove]:
+def choose_grooves(courses: Sequence[Course], *, pitch_px: float, lines: bool = False) -> list[CoarseGroove]:
     """Return the grooves among coarse courses, by growing row; none where no course stands out.
 
     Parameters
     ----------
     courses : sequence of Course
+    pitch_px : float
+        From groove to groove, roughly.
     lines : bool
         Whether edges are lone lines, so that nothing but their distances tells land from groove.
     """
@@ -95,7 +154,13 @@ def choose_grooves(courses: Sequence[Course], *, lines: bool = False) -> list[Co
         return []
     if lines:
         return pair(by_distance([course for course in courses if course.evidence > least]))
-    return mended(pair(taking_turns(courses, least)))
+    even, any_ = evenly_spaced(courses, least, pitch_px), taking_turns(courses, least)
+    # a pitch that was not seen, or not right, leaves gaps
+    return mended(pair(even if len(even) >= FEWEST_EVEN and _span(even) > MOST_OF_SPAN * _span(any_) else any_))
+
+
+def _span(edges: Sequence[Course]) -> float:
+    return float(np.median(edges[-1].row) - np.median(edges[0].row)) if edges else 0.0
 
 
 def by_distance(edges: Sequence[Course]) -> list[Course]:

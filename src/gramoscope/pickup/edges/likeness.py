@@ -10,13 +10,16 @@ LAGS = 6
 """Pixels so many rows or columns apart have independent noise."""
 
 
-def likeness(rest: FloatArray) -> FloatArray:
-    """Return how noise correlates with itself 0 … `LAGS` − 1 further along the first axis; it is 0 where unknown."""
+def likeness(rest: FloatArray, lags: int = LAGS) -> FloatArray:
+    """Return how noise correlates with itself 0 … `lags` − 1 further along the first axis; it is 0 where unknown.
+
+    From `LAGS` on it is none.
+    """
     known = rest != 0
     power = float((rest**2).sum()) / max(int(known.sum()), 1)
-    found = np.zeros(LAGS)
+    found = np.zeros(lags)
     found[0] = 1.0
-    for lag in range(1, min(LAGS, rest.shape[0])):
+    for lag in range(1, min(LAGS, lags, rest.shape[0])):
         pairs = int((known[lag:] & known[:-lag]).sum())
         if pairs == 0 or power == 0:
             break

@@ -21,7 +21,7 @@ from gramoscope.pickup.edges.column_places import ColumnPlaces, column_places
 from gramoscope.pickup.edges.edge_band import EdgeBand, edge_band
 from gramoscope.pickup.edges.edge_profile import EdgeProfile, learn_profile
 from gramoscope.pickup.edges.pooling import Pooled, pool_columns, pooled
-from gramoscope.pickup.edges.steady_course import FEWEST_PLACES, SteadyCourse, steady_course
+from gramoscope.pickup.edges.steady_course import FEWEST_PLACES, SteadyCourse, left_by_course, steady_course
 from gramoscope.quality import FlagArray, Quality, no_flags
 from gramoscope.signal_path import StillPicture
 
@@ -34,6 +34,8 @@ GUIDE_SIGMA_PX = 2.5
 """Error of the coarse course where nothing else leads."""
 LEAST_SIGMA_PX = 1e-3
 """No place is claimed to be known better than this."""
+LEAST_LEFT = 0.25
+"""A course that leaves less than this share of the errors to be seen tells nothing of them."""
 LEAST_SHARE = 0.02
 """An edge that is seen in less than this share of the columns is not seen."""
 
@@ -168,11 +170,16 @@ class Sharpening:
         if np.count_nonzero(seen) < max(FEWEST_PLACES, LEAST_SHARE * seen.size):
             return None
         variance = np.maximum(np.where(seen, places.variance, 1.0), LEAST_SIGMA_PX**2)
+        shared = 1 + 2 * places.likeness[1:].sum()
+        if guide is None:
+            # judged on a course that has followed part of the errors
+            usual = float(np.median(variance[seen])) * shared
+            variance = variance / max(left_by_course(places.likeness, 1 / usual, course.stiffness), LEAST_LEFT)
         if gated:
             scale = _scale(step[seen] / np.sqrt(variance[seen]))
             seen &= np.abs(places.step) < self.column_gate * np.sqrt(scale**2 * variance + course.variance)
         row = course.row + band.towards_land * (step + profile.middle_px)
-        weight = seen / (variance * (1 + 2 * places.likeness[1:].sum()))
+        weight = seen / (variance * shared)
         if guide is None:
             # as stiff as before: noise that is judged more strictly now is no reason to follow less
             settled = steady_course(row, weight, stiffness=course.stiffness)

@@ -30,6 +30,7 @@ STIFFNESS_DECADES = (-3.0, 7.0)
 IMPOSSIBLE = 1e12
 """κ over the median weight: between places that are followed one by one and a parabola."""
 FEWEST_PLACES = 8
+WAVES = 513
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,3 +125,24 @@ def steady_course(row: FloatArray, weight: FloatArray, *, stiffness: float | Non
         stiffness = scale * 10 ** float(best.x)
     factor, course, misfit = solved(stiffness)
     return SteadyCourse(course + origin, _inverse_diagonal(factor) * max(1.0, misfit / free), stiffness)
+
+
+def left_by_course(likeness: FloatArray, weight: float, stiffness: float) -> float:
+    """Return the share of the variance of errors that is left between the places and a course through them.
+
+    A course takes part of the errors for the edge and follows them, the more so the wider neighbours are alike, and what is
+    left tells of the others only. Waves of k radians a column are followed by w / (w + κ (2 − 2 cos k)³).
+
+    Parameters
+    ----------
+    likeness : float64 array, shape (lag,)
+        Correlation of the errors of columns so far apart, from lag 0, where it is 1.
+    weight : float
+        w of a place.
+    stiffness : float
+        κ of the course.
+    """
+    wave = np.linspace(0, np.pi, WAVES)
+    errors = np.maximum(2 * np.cos(np.outer(wave, np.arange(likeness.size))) @ likeness - 1, 0.0)
+    rough = stiffness * (2 - 2 * np.cos(wave)) ** ORDER
+    return float((errors * (rough / (weight + rough)) ** 2).sum() / errors.sum())
