@@ -267,9 +267,7 @@ def _listen(columns, rows, clear, half_px, ear, plan, first_bin, limits, said, w
             lane = (i - begin) * count
             if not clear[i].any():
                 weight[i] = np.float32(0)
-                for k in range(m + 1):
-                    bins[k * PAIR + lane : k * PAIR + lane + count] = np.float32(0)
-                    bins[k * PAIR + LANES + lane : k * PAIR + LANES + lane + count] = np.float32(0)
+                bins.reshape(m + 1, 2, LANES)[:, :, lane : lane + count] = np.float32(0)
                 continue
             _draw(columns, rows[i], clear[i], half_px, half_taps, basis[i], usual[i], limits, rooms, drawn, weight[i])
             where = transform(drawn.reshape(drawn.size), 0, radix, twiddle, one, other)
