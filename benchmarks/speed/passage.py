@@ -91,7 +91,8 @@ def page(rows: list[Played]) -> str:
         "*× the one before*: the passage is twice as long, so this should be 2.00, but for what is done once (processes "
         "started, compiled code loaded, the tonearm's first lesson, report and picture).",
         "",
-        "| groups | learning s | playing s | × the one before | ms a group | ms each further group | peak memory MiB "
+        "| groups | learning s | playing s | × the one before | ms a group | ms each further group "
+        "| client's peak memory MiB "
         "| real-time factor of playing |",
         "|---|---|---|---|---|---|---|---|",
     ]

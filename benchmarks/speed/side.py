@@ -1,6 +1,6 @@
 """A long passage through the store: does time grow with its length, memory not, and what do processes and Dask cost?
 
-    python -m benchmarks.speed.side [--groups 512,1024,2048] [--table benchmarks/speed/side.md]
+    python -m benchmarks.speed.side [--groups 512,1024,2048,4096] [--table benchmarks/speed/side.md]
 
 Films 64 groups (12 frames of 1280 × 512) and strings them together over and over by links; every line is a process of its own,
 recipe `best`. Times on the clock are of playing, without learning and without the start of workers. Processor time, of client
@@ -116,7 +116,7 @@ def page(lines: list[Line]) -> str:
 def main() -> int:
     """Run the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--groups", default="512,1024,2048", help="lengths; all executors play the first two")
+    parser.add_argument("--groups", default="512,1024,2048,4096", help="lengths; all executors play the first two")
     parser.add_argument("--table", type=Path, help="page to write")
     given = parser.parse_args()
     lengths, lines = [int(n) for n in given.groups.split(",")], []
