@@ -1,6 +1,6 @@
 """How fast is the recipe `best`, from frames in memory to velocities, stage by stage?
 
-    python -m benchmarks.speed.reading [--groups 128] [--device cuda] [--table benchmarks/speed/reading.md]
+    python -m benchmarks.speed.reading [--groups 512] [--device cuda] [--table benchmarks/speed/reading.md]
 
 Films a melody with the simulator (12 frames of 1280 × 512 a group), lets the cartridge learn, and times each stage on one
 thread, then the whole on one and on two. Bytes and shares are those of the roofline (`ceilings`), measured in the same run.
@@ -164,7 +164,7 @@ def page(rows: list[Row], capture: Capture, pixels: int, ceilings: Ceilings, dev
         "    python -m benchmarks.speed.reading --table benchmarks/speed/reading.md",
         "",
         f"{bench.sequence.frames_per_group} frames of {bench.sensor.width_px} × {bench.sensor.height_px}, 8 bits, "
-        f"{bench.rotation.radius_m * 1e3:g} mm, frames in memory, read on {device}. "
+        f"{bench.rotation.radius_m * 1e3:g} mm, {bench.sequence.groups} groups, frames in memory, read on {device}. "
         "Measured in the same run, on one thread of the processor: triad "
         f"{ceilings.triad_bytes_s / 1e9:.1f} GB/s, {ceilings.fma_s / 1e9:.0f} · 10⁹ single-precision multiply-adds a second.",
         "*Of the memory's rate*: what the stage has to read of the film, over what the triad moves in that time. "
@@ -183,7 +183,7 @@ def page(rows: list[Row], capture: Capture, pixels: int, ceilings: Ceilings, dev
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--groups", type=int, default=128)
+    parser.add_argument("--groups", type=int, default=512)
     parser.add_argument("--device", choices=DEVICES, default="cpu")
     parser.add_argument("--table", type=Path, help="page to write")
     given = parser.parse_args()
