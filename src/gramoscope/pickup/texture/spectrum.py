@@ -16,6 +16,7 @@ end where the information is. All windows are therefore whitened along the groov
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numba
 import numpy as np
@@ -162,43 +163,59 @@ class CrossSpectra:
         self.within += other.within
         self.weight += other.weight
 
+    @cached_property
+    def _to_lag_0(self) -> FloatArray:
+        """What each bin counts in the mean over all of a real transform's."""
+        share = np.full(self.weight.size, 2 / self.length)
+        share[0] = 1 / self.length
+        if self.length % 2 == 0:
+            share[-1] = 1 / self.length
+        return share
+
     @property
     def columns(self) -> float:
         """How many columns were summed over, each counted by the square of its weight."""
-        return float(fft.irfft(self.weight, self.length)[0])
+        return float(self._to_lag_0 @ self.weight)
 
     @property
     def covariance(self) -> FloatArray:
         """Of the rows in one column, shape (row, row)."""
-        return np.asarray(fft.irfft(self.within, self.length, axis=0)[0] / max(self.columns, 1.0))
+        return np.asarray(np.tensordot(self._to_lag_0, self.within, 1) / max(self.columns, 1.0))
+
+    def lags(self, largest_lag_px: int) -> FloatArray:
+        """Return the covariance of the rows of columns 0 … `largest_lag_px` apart, shape (lag, row, row)."""
+        columns = np.maximum(fft.irfft(self.weight, self.length)[: largest_lag_px + 1], 1.0)
+        return np.asarray(fft.irfft(self.within, self.length, axis=0)[: columns.size] / columns[:, None, None])
 
     def spectra(self, *, largest_lag_px: int, length: int) -> FloatArray:
-        """Return C_f.
+        """Return C_f; see `spectra_of`."""
+        return spectra_of(self.lags(largest_lag_px), length=length)
 
-        Parameters
-        ----------
-        largest_lag_px : int
-            The lag window is 1 to half of it and falls to zero as a cosine.
-        length : int
-            Of the transform in whose bins the answer is wanted, more than twice the largest lag.
 
-        Returns
-        -------
-        float64 array, shape (length // 2 + 1, row, row)
-        """
-        require(
-            length > 2 * largest_lag_px,
-            f"a transform of {length} for lags up to {largest_lag_px}",
-            "more than twice it",
-        )
-        u = np.arange(largest_lag_px + 1) / (largest_lag_px + 1)
-        taper = np.where(u < 0.5, 1.0, 0.5 * (1 + np.cos(2 * np.pi * (u - 0.5))))
-        columns = np.maximum(fft.irfft(self.weight, self.length)[: u.size], 1.0)
-        covariance = fft.irfft(self.within, self.length, axis=0)[: u.size] * (taper / columns)[:, None, None]
-        full = np.zeros((length, self.rows, self.rows))
-        full[: u.size] = covariance
-        full[-u.size + 1 :] = covariance[1:][::-1]
-        return np.asarray(fft.rfft(full, axis=0).real)
+def spectra_of(lags: FloatArray, *, length: int) -> FloatArray:
+    """Return C_f.
+
+    Parameters
+    ----------
+    lags : float64 array, shape (lag, row, row)
+        Covariances of rows so many columns apart, from 0 on. The lag window is 1 to half of the largest and falls to zero as
+        a cosine.
+    length : int
+        Of the transform in whose bins the answer is wanted, more than twice the largest lag.
+
+    Returns
+    -------
+    float64 array, shape (length // 2 + 1, row, row)
+    """
+    largest = len(lags) - 1
+    require(length > 2 * largest, f"a transform of {length} for lags up to {largest}", "more than twice it")
+    u = np.arange(largest + 1) / (largest + 1)
+    taper = np.where(u < 0.5, 1.0, 0.5 * (1 + np.cos(2 * np.pi * (u - 0.5))))
+    covariance = lags * taper[:, None, None]
+    full = np.zeros((length, *lags.shape[1:]))
+    full[: u.size] = covariance
+    full[-u.size + 1 :] = covariance[1:][::-1]
+    return np.asarray(fft.rfft(full, axis=0).real)
 
 
 def cross_spectra(window: Float32Array, weight: Float32Array, *, length: int) -> CrossSpectra:

@@ -36,7 +36,7 @@ from gramoscope.pickup.texture.likelihood import (
     softened,
 )
 from gramoscope.pickup.texture.reading import Model, Rules
-from gramoscope.pickup.texture.spectrum import CrossSpectra, cross_spectra, precision
+from gramoscope.pickup.texture.spectrum import CrossSpectra, cross_spectra, precision, spectra_of
 from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.pickup.texture.vector_lanes import LANES
 
@@ -251,15 +251,22 @@ class StripeLearning:
         known = list(material.spread(lambda one: self._forms(one, material.model, loading), sums))
         deaf = self._deaf(sums[-1], known[-1])
         seen = [one.through(deaf.basis.astype(np.float64)) for one in known]
-        alone = [[self._heard_by(deaf, form, one, material.model) for form in one.witnesses] for one in seen]
+        alone = list(
+            material.spread(
+                lambda one: [self._heard_by(deaf, form, one, material.model) for form in one.witnesses], seen
+            )
+        )
         _, answers, powers = material.tried([[bank for bank, _ in pair] for pair in alone])
         shares = best_shares(answers, powers)
-        banks = []
-        for one, pair in zip(seen, alone, strict=True):
+
+        def best_of(both: tuple[Forms, list[tuple[FilterBank, float]]]) -> FilterBank:
+            one, pair = both
             mixed = sum(
                 share / loudness * form for share, (_, loudness), form in zip(shares, pair, one.witnesses, strict=True)
             )
-            banks.append(self._heard_by(deaf, np.asarray(mixed), one, material.model)[0])
+            return self._heard_by(deaf, np.asarray(mixed), one, material.model)[0]
+
+        banks = list(material.spread(best_of, zip(seen, alone, strict=True)))
         mean, answers, powers = material.tried([[bank] for bank in banks])
         return [
             StripeStatistics(
@@ -276,10 +283,11 @@ class StripeLearning:
     def _forms(self, sums: CrossSpectra, model: Model, loading: float) -> Forms:
         """What spectra say about paths, in the bins that they can tell apart."""
         bins = model.band.bins(self.length)
-        wide = sums.spectra(largest_lag_px=self.largest_lag_px, length=self.length)
+        lags = sums.lags(max(self.largest_lag_px, self.change_lag_px))
+        wide = spectra_of(lags[: self.largest_lag_px + 1], length=self.length)
         c = wide[:, INNER_ROWS, INNER_ROWS]
         inverse, _ = precision(c, band=bins, loading=loading, smooth_bins=SMOOTH_CYCLES * self.length)
-        near = sums.spectra(largest_lag_px=self.change_lag_px, length=self.length)[bins]
+        near = spectra_of(lags[: self.change_lag_px + 1], length=self.length)[bins]
         slope = np.pad(across(c.shape[1], SHARP), ((0, 0), (REACH - SHARP.size,) * 2))
         half = slope @ near[:, :, INNER_ROWS]
         forms = witness_forms(inverse, half + half.transpose(0, 2, 1), spread_px=model.spread_px)
