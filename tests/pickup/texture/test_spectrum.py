@@ -11,7 +11,6 @@ from gramoscope.pickup.texture.likelihood import softened
 from gramoscope.pickup.texture.spectrum import (
     Band,
     CrossSpectra,
-    cross_spectra,
     filtered,
     precision,
     whitening_filter,
@@ -49,7 +48,7 @@ def _weight(rng: np.random.Generator, width: int = WIDTH) -> np.ndarray:
 def _summed(rng: np.random.Generator, windows: int) -> CrossSpectra:
     total = CrossSpectra(3, LENGTH)
     for _ in range(windows):
-        total.add(cross_spectra(_rows(rng), _weight(rng), length=LENGTH))
+        total.see(_rows(rng), _weight(rng))
     return total
 
 
@@ -75,7 +74,7 @@ def test_columns_are_counted_by_the_square_of_their_weight() -> None:
     for _ in range(3):
         weight = 0.7 * _weight(rng)
         count += float((weight.astype(np.float64) ** 2).sum())
-        total.add(cross_spectra(_rows(rng), weight, length=LENGTH))
+        total.see(_rows(rng), weight)
     assert total.columns == pytest.approx(count, rel=1e-6)
 
 
@@ -107,7 +106,9 @@ def test_lags_count_fully_up_to_half_the_window_and_not_beyond_it(lag: int, shar
     rows = np.zeros((WIDTH, 1), np.float32)
     rows[[200, 200 + lag]] = 1.0
     weight = np.ones(WIDTH, np.float32)
-    found = cross_spectra(rows, weight, length=LENGTH).spectra(largest_lag_px=LAG_PX, length=LENGTH)
+    sums = CrossSpectra(rows.shape[1], LENGTH)
+    sums.see(rows, weight)
+    found = sums.spectra(largest_lag_px=LAG_PX, length=LENGTH)
     assert fft.irfft(found[:, 0, 0], LENGTH)[lag] * (WIDTH - lag) == pytest.approx(share, abs=0.04)
 
 

@@ -158,6 +158,21 @@ class CrossSpectra:
         self.within: FloatArray = np.zeros((bins, self.rows, self.rows))
         self.weight: FloatArray = np.zeros(bins)
 
+    def see(self, window: Float32Array, weight: Float32Array) -> None:
+        """Add a window's, zero where its columns have no weight.
+
+        Parameters
+        ----------
+        window : float32 array, shape (column, row)
+            Whitened.
+        weight : float32 array, shape (column,)
+            0 … 1, rising and falling softly.
+        """
+        x = fft.rfft(window * weight[:, None], self.length, axis=0)
+        seen = np.stack([x.real, x.imag], axis=2)
+        self.within += seen @ seen.transpose(0, 2, 1)
+        self.weight += np.abs(fft.rfft(weight.astype(np.float64), self.length)) ** 2
+
     def add(self, other: CrossSpectra) -> None:
         """Add the sums of other windows."""
         self.within += other.within
@@ -216,26 +231,6 @@ def spectra_of(lags: FloatArray, *, length: int) -> FloatArray:
     full[: u.size] = covariance
     full[-u.size + 1 :] = covariance[1:][::-1]
     return np.asarray(fft.rfft(full, axis=0).real)
-
-
-def cross_spectra(window: Float32Array, weight: Float32Array, *, length: int) -> CrossSpectra:
-    """Return the cross-spectra of one window, zero where its columns have no weight.
-
-    Parameters
-    ----------
-    window : float32 array, shape (column, row)
-        Whitened.
-    weight : float32 array, shape (column,)
-        0 … 1, rising and falling softly.
-    length : int
-        Of the transforms.
-    """
-    out = CrossSpectra(window.shape[1], length)
-    x = fft.rfft(window * weight[:, None], length, axis=0)
-    seen = np.stack([x.real, x.imag], axis=2)
-    out.within += seen @ seen.transpose(0, 2, 1)
-    out.weight += np.abs(fft.rfft(weight.astype(np.float64), length)) ** 2
-    return out
 
 
 def precision(c: FloatArray, *, band: slice, loading: float, smooth_bins: float) -> tuple[FloatArray, FloatArray]:

@@ -7,6 +7,7 @@ is what is read by.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,7 +37,7 @@ from gramoscope.pickup.texture.likelihood import (
     softened,
 )
 from gramoscope.pickup.texture.reading import Model, Rules
-from gramoscope.pickup.texture.spectrum import CrossSpectra, cross_spectra, precision, spectra_of
+from gramoscope.pickup.texture.spectrum import CrossSpectra, precision, spectra_of
 from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.pickup.texture.vector_lanes import LANES
 
@@ -89,29 +90,40 @@ class StripeMaterial:
 
     def sums(self, before: StripeStatistics | None) -> list[CrossSpectra]:
         """Return the cross-spectra of all stretches without each fold, and of all of them."""
-
-        def summed(stretch: Stretch) -> CrossSpectra | None:
-            row, clear = self.clear(stretch)
-            if not clear.any():
-                return None
-            window = self.model.window(stretch.columns, row)
-            inner = window[:, INNER_ROWS]
-            usual = before.row_power[INNER_ROWS] if before is not None else np.median(inner**2, axis=0) / CHI2_MEDIAN
-            power = inner**2 @ (1 / (usual.size * np.maximum(usual, 1e-12)))
-            weight = softened(clear & believable(power, limits=self.rules.power_limits))
-            return cross_spectra(window, weight, length=self.model.length) if weight.sum() > LEAST_WEIGHT else None
-
         rows = wide_rows(self.model.half_px)
+
+        def summed(some: Sequence[Stretch]) -> CrossSpectra:
+            total = CrossSpectra(rows, self.model.length)
+            for stretch in some:
+                self._add(stretch, before, total)
+            return total
+
+        parts = [(k, some) for k in range(self.folds) for some in _in_parts(self._of_fold(k))]
         of_fold = [CrossSpectra(rows, self.model.length) for _ in range(self.folds)]
-        for one, k in zip(self.spread(summed, self.stretches), self.fold, strict=True):
-            if one is not None:
-                of_fold[k].add(one)
+        for one, (k, _) in zip(self.spread(summed, [some for _, some in parts]), parts, strict=True):
+            of_fold[k].add(one)
         totals = [CrossSpectra(rows, self.model.length) for _ in range(self.folds + 1)]
         for left, total in enumerate(totals):
             for k, one in enumerate(of_fold):
                 if k != left:
                     total.add(one)
         return totals
+
+    def _of_fold(self, number: int) -> list[Stretch]:
+        return [stretch for stretch, k in zip(self.stretches, self.fold, strict=True) if k == number]
+
+    def _add(self, stretch: Stretch, before: StripeStatistics | None, total: CrossSpectra) -> None:
+        """Add the cross-spectra of one stretch, where the stripe can be seen and is believed."""
+        row, clear = self.clear(stretch)
+        if not clear.any():
+            return
+        window = self.model.window(stretch.columns, row)
+        inner = window[:, INNER_ROWS]
+        usual = before.row_power[INNER_ROWS] if before is not None else np.median(inner**2, axis=0) / CHI2_MEDIAN
+        power = inner**2 @ (1 / (usual.size * np.maximum(usual, 1e-12)))
+        weight = softened(clear & believable(power, limits=self.rules.power_limits))
+        if weight.sum() > LEAST_WEIGHT:
+            total.see(window, weight)
 
     def tried(self, banks: list[list[FilterBank]]) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the means of what banks say, how they answer to a moved path, and their powers.
@@ -151,6 +163,14 @@ class StripeMaterial:
         )
         answers = sum((answer for _, _, answer in told), np.zeros(count)) / columns
         return mean, answers, powers
+
+
+PART = 4
+"""So many stretches are summed by one thread, whatever the number of threads: sums do not depend on that."""
+
+
+def _in_parts(stretches: Sequence[Stretch]) -> list[Sequence[Stretch]]:
+    return [stretches[first : first + PART] for first in range(0, len(stretches), PART)]
 
 
 CHI2_MEDIAN = 0.455
