@@ -143,7 +143,7 @@ class Processes:
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-MANY_GROUPS = 512
+MANY_GROUPS = 2048
 """So many are read sooner by processes, which take a few seconds to start, than by threads, which wait for each other's turn
 with the interpreter."""
 
