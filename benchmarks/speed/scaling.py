@@ -1,6 +1,6 @@
 """How many workers are worth having when all read from the same storage, and what stops them?
 
-    python -m benchmarks.speed.scaling [--group-ms 30 --client-ms 4] [--table benchmarks/speed/scaling.md]
+    python -m benchmarks.speed.scaling [--group-ms 20 --client-ms 4.4] [--table benchmarks/speed/scaling.md]
 
 A calculation, not a measurement: nobody had 256 workers. A worker takes its own time for a group (`--group-ms`), and waits for
 what all share: the storage, for frames and for the reading that goes to disk and comes back, and the client, which splices and
@@ -89,9 +89,9 @@ def _why(name: str, group_s: float, storage_bytes_s: float, store_bytes: float, 
 def main() -> int:
     """Calculate."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--group-ms", type=float, default=30.0, help="a worker's own time for a group")
-    parser.add_argument("--client-ms", type=float, default=4.0, help="the client's time for a group")
-    parser.add_argument("--store-kb", type=float, default=664.0, help="what is kept of a group")
+    parser.add_argument("--group-ms", type=float, default=20.0, help="a worker's own time for a group")
+    parser.add_argument("--client-ms", type=float, default=4.4, help="the client's time for a group")
+    parser.add_argument("--store-kb", type=float, default=425.0, help="what is kept of a group")
     parser.add_argument("--table", type=Path, help="page to write")
     given = parser.parse_args()
     text = page(given.group_ms / 1e3, given.client_ms / 1e3, given.store_kb * 1e3)
