@@ -45,7 +45,9 @@ def test_a_quick_look_reads_a_few_groups_only(tmp_path, bench, film, write, monk
     read = []
     source_read = capture.source.read_group
     monkeypatch.setattr(
-        type(capture.source), "read_group", lambda self, number: read.append(number) or source_read(number)
+        type(capture.source),
+        "read_group",
+        lambda self, number, *more: read.append(number) or source_read(number, *more),
     )
     seen = inspect(capture, quick=True)
     assert len(read) == 5

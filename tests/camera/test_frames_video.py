@@ -3,6 +3,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
+from gramoscope.camera.contents import Contents
 from gramoscope.camera.frames_video import VideoFrames, VideoWriter
 from gramoscope.camera.sensor import Sensor
 
@@ -52,7 +53,7 @@ def number_of(frame):
 
 
 def numbers_of_group(source, group):
-    return [number_of(frame) for frame in source.read_group(group)]
+    return [number_of(frame) for frame in source.read_group(group, Contents())]
 
 
 def expected(group):
@@ -114,5 +115,5 @@ def test_ffv1_loses_nothing(tmp_path, bits):
     writer = VideoWriter(tmp_path / "film.mkv", sensor=sensor)
     writer.write(frames)
     writer.close()
-    read = list(VideoFrames(tmp_path / "film.mkv", frames_per_group=4).read_group(0))
+    read = list(VideoFrames(tmp_path / "film.mkv", frames_per_group=4).read_group(0, Contents()))
     np.testing.assert_array_equal(np.stack(read), frames)

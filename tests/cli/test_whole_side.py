@@ -100,7 +100,7 @@ def test_a_plan_is_told(gramoscope: Callable[..., Any], capture: Path, quickly: 
         ("auto", 2, MANY_GROUPS, Processes),
         ("auto", 2, MANY_GROUPS - 1, Threads),
         ("auto", 1, MANY_GROUPS, Threads),
-        ("auto", 2, 0, Threads),
+        ("auto", 2, 0, None),
         ("threads", 2, MANY_GROUPS, None),
         ("processes", 2, 8, Processes),
     ],

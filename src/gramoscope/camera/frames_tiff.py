@@ -12,7 +12,7 @@ import numpy as np
 import tifffile
 from PIL import Image
 
-from gramoscope.camera.contents import Contents
+from gramoscope.camera.contents import Bytes, Contents
 from gramoscope.camera.frames import Frame, Layout, Lost, words_of, wrong_size
 from gramoscope.camera.pattern import FramePattern, is_inside
 from gramoscope.camera.plain_tiff import plain_pages
@@ -79,7 +79,6 @@ def read_pages(path: Path, contents: Contents, *, folder: Path, frames: int, sen
         with quiet_log():
             tiff = tifffile.TiffFile(path)
             channels = _channel_pages(tiff, frames=frames)
-            plain = plain_pages(tiff, data) if channels == 1 else []
     except FileNotFoundError:
         yield Lost(f"{path.name} is missing", rest=True)
         return
@@ -87,10 +86,19 @@ def read_pages(path: Path, contents: Contents, *, folder: Path, frames: int, sen
         yield Lost(f"{path.name} cannot be read ({words_of(error)})", rest=True)
         return
     with tiff:
+        plain = _plain_pages(tiff, data) if channels == 1 else []
         if plain and plain[0].shape == (sensor.height_px, sensor.width_px):
             yield from (page.astype(page.dtype.newbyteorder("="), copy=False) for page in plain)
             return
         yield from _read_pages(tiff, path=path, channels=channels, sensor=sensor)
+
+
+def _plain_pages(tiff: tifffile.TiffFile, data: Bytes) -> list[Frame]:
+    try:
+        with quiet_log():
+            return plain_pages(tiff, data)
+    except Exception:  # as above; what is broken is told page by page
+        return []
 
 
 def _read_pages(tiff: tifffile.TiffFile, *, path: Path, channels: int, sensor: Sensor) -> Iterator[Frame | Lost]:

@@ -164,6 +164,6 @@ def _executor(
         from gramoscope.player.cluster import Cluster
 
         return Cluster(scheduler, workers, told)
-    if name == "auto":
+    if name == "auto" and groups:
         return usual_executor(workers, groups)
     return Processes(workers) if name == "processes" else None
