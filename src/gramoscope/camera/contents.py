@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -37,7 +38,8 @@ class Contents:
         """Return the bytes of a file, uint8 array; raises OSError if it cannot be read."""
         total = hashlib.sha256()
         with path.open("rb", buffering=0) as file:
-            room = np.empty(path.stat().st_size, np.uint8)
+            # of the file that is open, whatever lies there by now
+            room = np.empty(os.fstat(file.fileno()).st_size, np.uint8)
             done = 0
             while done < room.size and (count := file.readinto(room[done : done + PIECE_BYTES].data)):
                 if self.summed:

@@ -50,6 +50,7 @@ def test_600_hz_on_both_walls_of_six_grooves(micrograph: Make, picture_of: Make)
     assert len(grooves) == 6
     edges = [_places(groove, wall) for groove in grooves for wall in (OUTER, INNER)]
     rates = np.array([_rate(places, 1 / 300, 1 / 120) for places in edges])
+    assert np.abs(rates / np.median(rates) - 1).max() < 0.01
     rows = np.array([row.mean() for _, row, _ in edges])
     # a turn takes as long at every radius: periods get shorter towards the centre, by half a per cent in this picture
     assert np.abs(rates / np.polyval(np.polyfit(rows, rates, 1), rows) - 1).max() < 0.01
