@@ -20,6 +20,10 @@ from gramoscope.player.pieces import Reader, Task, read_elsewhere
 INSTALL = 'pip install "gramoscope[cluster]"'
 PATIENCE_S = 30.0
 """A scheduler that does not answer for so long is not there."""
+SPAWN = "distributed.nanny.pre-spawn-environ"
+TRIM = "MALLOC_TRIM_THRESHOLD_"
+"""With it Dask has its workers give memory back at every turn; frames come and go by megabytes, and each page of them would be
+asked for anew: a third of the time of a worker that reads."""
 
 
 @dataclass(frozen=True)
@@ -53,11 +57,11 @@ class Cluster:
         WorkerError
             If nobody answers at the address, or has no workers.
         """
-        dask = _distributed()
-        with _client(dask, self.scheduler, self.workers) as client:
+        distributed = _distributed()
+        with _client(distributed, self.scheduler, self.workers) as client:
             if client.dashboard_link:
                 self.told(f"watch the workers at {client.dashboard_link}")
-            crew = _ClusterCrew(client, dask)
+            crew = _ClusterCrew(client, distributed)
             try:
                 yield crew
             finally:
@@ -73,17 +77,21 @@ def _distributed() -> Any:
 
 
 @contextmanager
-def _client(dask: Any, scheduler: str | None, workers: int) -> Iterator[Any]:
+def _client(distributed: Any, scheduler: str | None, workers: int) -> Iterator[Any]:
     if scheduler is None:
         logging.getLogger("distributed").setLevel(logging.ERROR)
-        local = dask.LocalCluster(
-            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0", memory_limit=0
-        )
-        with local, dask.Client(local) as client:
+        import dask.config
+
+        environ = {name: value for name, value in dask.config.get(SPAWN, {}).items() if name != TRIM}
+        with dask.config.set({SPAWN: environ}):
+            local = distributed.LocalCluster(
+                n_workers=workers, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0", memory_limit=0
+            )
+        with local, distributed.Client(local) as client:
             yield client
         return
     try:
-        client = dask.Client(scheduler, timeout=PATIENCE_S)
+        client = distributed.Client(scheduler, timeout=PATIENCE_S)
         client.wait_for_workers(1, timeout=PATIENCE_S)
     except (OSError, TimeoutError, ValueError) as error:
         raise WorkerError(
