@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -124,6 +125,17 @@ def test_a_scheduler_that_is_not_there_is_told(capture: Path, tmp_path: Path, mo
     executor = cluster_module.Cluster("tcp://127.0.0.1:9", 1, print)
     with pytest.raises(WorkerError, match=r"answers at tcp://127\.0\.0\.1:9"):
         _numbers(capture, tmp_path, Work(executor))
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning:distributed", "ignore::DeprecationWarning:tornado")
+def test_workers_of_dask_on_this_machine_keep_their_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    distributed = pytest.importorskip("distributed", reason="the extra cluster is not installed")
+    monkeypatch.delenv(cluster_module.TRIM, raising=False)
+    asked = (cluster_module.TRIM, "OMP_NUM_THREADS")
+    with cluster_module._client(distributed, None, 1) as client:
+        (environ,) = client.run(lambda: [os.environ.get(name) for name in asked]).values()
+    # the first is Dask's own habit, the second is to stay
+    assert environ == [None, "1"]
 
 
 def test_a_plan_adds_up(capture: Path) -> None:
