@@ -16,7 +16,16 @@ import numba
 import numpy as np
 
 from gramoscope.conventions import BoolArray, FloatArray, IntArray
-from gramoscope.tonearm.small_matrices import STATES, add_products, block_sandwich, block_vector, dot, times
+from gramoscope.tonearm.small_matrices import (
+    STATES,
+    add_products,
+    add_scaled,
+    block_sandwich,
+    block_vector,
+    dot,
+    scaled,
+    times,
+)
 
 SOURCES = 2
 FORGIVENESS = 8
@@ -180,12 +189,10 @@ def _move(a, at, q, first, agitation, m, p, half, m_out, p_out):  # type: ignore
 @numba.njit(cache=True, nogil=True)
 def _observe(innovation, spread, ph, gain, j, m, p):  # type: ignore[no-untyped-def]
     """Update mean and covariance in place and write K."""
-    for i in range(m.size):
-        gain[j, i] = -ph[i] / spread
+    scaled(-1 / spread, ph, 0, gain, j, m.size)
     add_products(ph, 0, gain, j, p)
-    for i in range(m.size):
-        gain[j, i] = -gain[j, i]
-        m[i] += gain[j, i] * innovation
+    scaled(-1.0, gain, j, gain, j, m.size)
+    add_scaled(innovation, gain, j, m, 0, m.size)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -225,15 +232,14 @@ def _before_others(h, j, ph, first, used, spread, gain):  # type: ignore[no-unty
         if used[i]:
             share = dot(gain, i, h, j, ph.size)
             more += spread[i] * share**2
-            for n in range(ph.size):
-                ph[n] += spread[i] * share * gain[i, n]
+            add_scaled(spread[i] * share, gain, i, ph, 0, ph.size)
     return more
 
 
 @numba.njit(cache=True, nogil=True)
 def _filter(a, at, q, model, agitation, places, source, h, value, variance, gate_variance, rule, allowed, lost, m, p, missed, since, want, means, toward, misses, sinces, used, nu, spread, gain, expected, resume, m_resume, p_resume):  # type: ignore  # fmt: skip  # noqa: E501
     width, patience, anywhere, doubt = rule
-    size = m.size
+    size, wanted = m.size, want.shape[0]
     half, ph, m_next, p_next = np.empty((STATES, STATES)), np.empty_like(m), np.empty_like(m), np.empty_like(p)
     loglik = 0.0
     j = 0
@@ -241,12 +247,10 @@ def _filter(a, at, q, model, agitation, places, source, h, value, variance, gate
         lost[k] |= _count(missed, since, patience, misses, sinces, k)
         if lost[k]:
             _lose(p, anywhere, doubt)
-        for i in range(size):
-            means[k, i] = m[i]
-        for i in range(want.shape[0]):
+        scaled(1.0, m, 0, means, k, size)
+        for i in range(wanted):
             times(p, want, i, ph)
-            for n in range(size):
-                toward[k, i, n] = ph[n]
+            scaled(1.0, ph, 0, toward, k * wanted + i, size)
         if k == resume:
             m_resume[:], p_resume[:] = m, p
         first = j
@@ -262,8 +266,7 @@ def _filter(a, at, q, model, agitation, places, source, h, value, variance, gate
                 _observe(nu[j], spread[j], ph, gain, j, m, p)
             expected[j] = seen + _before_others(h, j, ph, first, used, spread, gain)
             if not used[j]:
-                for i in range(size):
-                    gain[j, i] = ph[i]
+                scaled(1.0, ph, 0, gain, j, size)
             j += 1
         _move(a, at, q, size * model[k], agitation[k], m, p, half, m_next, p_next)
         m, m_next = m_next, m
@@ -318,7 +321,7 @@ def forward(
         *moves.stacked, moves.model, moves.agitation, readings.bin, readings.source, readings.h,
         readings.value, readings.variance, readings.gate_variance,
         (rule.width, rule.patience, rule.anywhere, rule.doubt), may, lost,
-        begin.mean.copy(), begin.covariance.copy(), begin.missed.copy(), begin.since.copy(), want, means, toward,
+        begin.mean.copy(), begin.covariance.copy(), begin.missed.copy(), begin.since.copy(), want, means, toward.reshape(-1, size),
         misses, sinces, used, nu, spread, gain, expected, resume, m_resume, p_resume,
     )  # fmt: skip
     kept = not lost[resume]

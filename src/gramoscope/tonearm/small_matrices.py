@@ -8,9 +8,20 @@ from __future__ import annotations
 
 import numba
 
-from gramoscope.tonearm.vector_rows import STATES, add_outer, add_row_times, inner, mirror, multiply, transpose
+from gramoscope.tonearm.vector_rows import (
+    STATES,
+    add_multiple,
+    add_outer,
+    add_row_times,
+    inner,
+    mirror,
+    multiple,
+    multiply,
+    quadratic_form,
+    transpose,
+)
 
-__all__ = ["STATES", "add_products", "block_sandwich", "block_vector", "dot", "times"]
+__all__ = ["STATES", "add_products", "add_scaled", "block_sandwich", "block_vector", "dot", "scaled", "times"]
 
 
 @numba.njit(cache=True, nogil=True)
@@ -47,6 +58,8 @@ def dot(x, i, y, j, size):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True, nogil=True)
 def times(p, h, j, out):  # type: ignore[no-untyped-def]
     """Write p h for symmetric p and return hᵀ p h."""
+    if out.size == 2 * STATES:
+        return quadratic_form(h, j, 0, p, 0, 0, out, 0, 0)
     for i in range(out.size):
         out[i] = 0.0
     for b in range(0, out.size, STATES):
@@ -61,3 +74,17 @@ def add_products(x, i, y, j, p):  # type: ignore[no-untyped-def]
     for b in range(0, p.shape[0], STATES):
         for c in range(0, p.shape[0], STATES):
             add_outer(x, i, b, y, j, c, p, b, c)
+
+
+@numba.njit(cache=True, nogil=True)
+def scaled(c, x, i, out, j, size):  # type: ignore[no-untyped-def]
+    """Write c x."""
+    for b in range(0, size, STATES):
+        multiple(c, x, i, b, out, j, b)
+
+
+@numba.njit(cache=True, nogil=True)
+def add_scaled(c, x, i, out, j, size):  # type: ignore[no-untyped-def]
+    """Add c x to a vector."""
+    for b in range(0, size, STATES):
+        add_multiple(c, x, i, b, out, j, b)

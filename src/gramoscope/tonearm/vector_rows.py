@@ -3,7 +3,7 @@
 Numba's loops over eight numbers become eight scalar instructions each; told that a row is one vector, LLVM makes one or two of
 them, whatever the processor has, and a product takes a fifth of the time. Each matrix, and each vector, is given by an array of
 float64 and the row and the column of it where it begins, for making views costs as much as a product; of an array with one
-dimension the row is 0. The rows of an array lie in one piece each.
+dimension the row is 0. The rows of an array lie in one piece each. A number by which rows are multiplied comes first.
 """
 
 from __future__ import annotations
@@ -33,28 +33,38 @@ class _Writer:
     def __init__(self, context: Any, builder: Any, signature: Any, arguments: Any) -> None:
         self.builder = builder
         self._matrices = []
-        for i in range(0, len(arguments), 3):
+        first = len(arguments) % 3
+        self.numbers = [context.cast(builder, arguments[i], signature.args[i], types.float64) for i in range(first)]
+        for i in range(first, len(arguments), 3):
             array = context.make_array(signature.args[i])(context, builder, arguments[i])
             row, column = (context.cast(builder, arguments[i + k], signature.args[i + k], types.intp) for k in (1, 2))
             stride = builder.extract_value(array.strides, 0)
-            first = builder.add(builder.mul(row, stride), builder.mul(column, ir.Constant(_LONG, 8)))
-            begin = builder.gep(builder.bitcast(array.data, ir.IntType(8).as_pointer()), [first])
+            there = builder.add(builder.mul(row, stride), builder.mul(column, ir.Constant(_LONG, 8)))
+            begin = builder.gep(builder.bitcast(array.data, ir.IntType(8).as_pointer()), [there])
             self._matrices.append((begin, stride))
 
     def _row(self, matrix: int, row: int) -> Value:
         begin, stride = self._matrices[matrix]
         return self.builder.gep(begin, [self.builder.mul(stride, ir.Constant(_LONG, row))]) if row else begin
 
-    def load(self, matrix: int, row: int = 0) -> Value:
-        return self.builder.load(self.builder.bitcast(self._row(matrix, row), _ROW.as_pointer()), align=8)
+    def _part(self, matrix: int, row: int, part: int) -> Value:
+        return self.builder.gep(
+            self.builder.bitcast(self._row(matrix, row), _ROW.as_pointer()), [ir.Constant(_LONG, part)]
+        )
 
-    def store(self, value: Value, matrix: int, row: int = 0) -> None:
-        self.builder.store(value, self.builder.bitcast(self._row(matrix, row), _ROW.as_pointer()), align=8)
+    def load(self, matrix: int, row: int = 0, part: int = 0) -> Value:
+        return self.builder.load(self._part(matrix, row, part), align=8)
+
+    def store(self, value: Value, matrix: int, row: int = 0, part: int = 0) -> None:
+        self.builder.store(value, self._part(matrix, row, part), align=8)
 
     def spread(self, matrix: int, row: int, column: int) -> Value:
         """One element, in all places of a row."""
         begin = self.builder.bitcast(self._row(matrix, row), _DOUBLE.as_pointer())
-        value = self.builder.load(self.builder.gep(begin, [ir.Constant(_LONG, column)]))
+        return self.everywhere(self.builder.load(self.builder.gep(begin, [ir.Constant(_LONG, column)])))
+
+    def everywhere(self, value: Value) -> Value:
+        """A number, in all places of a row."""
         return self.choose(self.builder.insert_element(_ANY, value, ir.Constant(_INT, 0)), _ANY, [0] * STATES)
 
     def choose(self, one: Value, other: Value, which: list[int]) -> Value:
@@ -113,10 +123,34 @@ def _vector_product(write: _Writer) -> None:
     write.store(write.builder.fadd(even, odd), 2)
 
 
+def _quadratic_form(write: _Writer) -> Value:
+    """Both halves of the product at once, each as two sums: nothing waits for what it has just written."""
+    halves = 2
+    h = [write.spread(0, 0, k) for k in range(halves * STATES)]
+    seen = []
+    for c in range(halves):
+        even, odd = (write.builder.fmul(h[k], write.load(1, k, c)) for k in range(2))
+        for k in range(2, halves * STATES, 2):
+            even = write.times_and(h[k], write.load(1, k, c), even)
+            odd = write.times_and(h[k + 1], write.load(1, k + 1, c), odd)
+        both = write.builder.fadd(even, odd)
+        write.store(both, 2, 0, c)
+        seen.append(write.builder.fmul(both, write.load(0, 0, c)))
+    return write.total(write.builder.fadd(*seen))
+
+
 def _outer_product(write: _Writer) -> None:
     y = write.load(1)
     for i in _EACH:
         write.store(write.times_and(write.spread(0, 0, i), y, write.load(2, i)), 2, i)
+
+
+def _multiple(write: _Writer) -> None:
+    write.store(write.builder.fmul(write.everywhere(write.numbers[0]), write.load(0)), 1)
+
+
+def _sum_with_multiple(write: _Writer) -> None:
+    write.store(write.times_and(write.everywhere(write.numbers[0]), write.load(0), write.load(1)), 1)
 
 
 def _inner_product(write: _Writer) -> Value:
@@ -147,9 +181,27 @@ def add_row_times(_, h, h_row, h_column, x, x_row, x_column, out, row, column): 
 
 
 @_compiled
+def quadratic_form(_, h, h_row, h_column, p, p_row, p_column, out, row, column):  # type: ignore[no-untyped-def]
+    """Write p h for a symmetric p of 16 × 16 and a vector of as many, and return hᵀ p h."""
+    return _function(types.float64, (h, h_row, h_column, p, p_row, p_column, out, row, column), _quadratic_form)
+
+
+@_compiled
 def add_outer(_, x, x_row, x_column, y, y_row, y_column, out, row, column):  # type: ignore[no-untyped-def]
     """Add the matrix x yᵀ to another."""
     return _function(types.void, (x, x_row, x_column, y, y_row, y_column, out, row, column), _outer_product)
+
+
+@_compiled
+def multiple(_, c, x, x_row, x_column, out, row, column):  # type: ignore[no-untyped-def]
+    """Write the vector c x; the result may lie where x does."""
+    return _function(types.void, (c, x, x_row, x_column, out, row, column), _multiple)
+
+
+@_compiled
+def add_multiple(_, c, x, x_row, x_column, out, row, column):  # type: ignore[no-untyped-def]
+    """Add the vector c x to another."""
+    return _function(types.void, (c, x, x_row, x_column, out, row, column), _sum_with_multiple)
 
 
 @_compiled

@@ -20,7 +20,7 @@ CELL_PX = 8
 ROWS = 16
 """So many rows are looked at before their energies are written."""
 CEILING = 1.5
-SOME_FRAMES = 6
+SOME_FRAMES = 4
 """So many frames at most, the first and the last among them, show where the picture is sharp: most of what is uncertain is the
 texture, the same in all."""
 
