@@ -42,7 +42,7 @@ class FrameGroup:
         Which group of the capture this is, from 0.
     images : uint8 or uint16 array, shape (frame, row, column)
         Grey, canonical (see `gramoscope.conventions`): s grows with the column, l with the row. A frame that could not
-        be read is all zeros and not `valid`.
+        be read is all zeros and not `valid`. Each frame lies in one piece; from one to the next there may be a gap.
     arc_start_m : float64 array, shape (frame,)
         Nominal place s of column 0 in each frame: what the encoder or the manifest says. The pictures know better.
     stage_m : float64 array, shape (frame,)

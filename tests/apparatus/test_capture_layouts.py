@@ -19,7 +19,7 @@ LAYOUTS = ("tiff", "png", "zarr", "video")
 def assert_shows(capture, pictures):
     for group, images in zip(capture.groups(), pictures, strict=True):
         np.testing.assert_array_equal(group.images, images)
-        assert group.images.flags.c_contiguous
+        assert all(image.flags.c_contiguous for image in group.images)
         assert group.valid.all()
         assert group.problems == ()
 

@@ -6,13 +6,12 @@ What the world did to the frames (one is missing, truncated, of the wrong size) 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from gramoscope.apparatus.bench import Bench
 from gramoscope.apparatus.filming import MARKER
@@ -20,13 +19,13 @@ from gramoscope.apparatus.fingerprint import sha256_of_file, sha256_of_files
 from gramoscope.apparatus.frame_log import FrameLog, nominal_arc_m, read_log
 from gramoscope.apparatus.manifest import MANIFEST_NAME, Manifest, read_manifest
 from gramoscope.camera.contents import Contents
-from gramoscope.camera.frames import Frame, FrameSource, Layout, Lost, Unusable, develop
+from gramoscope.camera.frames import Frame, FrameSource, Layout, Lost, Unusable, as_they_lie, develop
 from gramoscope.camera.frames_image import ImageFrames
 from gramoscope.camera.frames_tiff import TiffFrames
 from gramoscope.camera.frames_video import VideoFrames
 from gramoscope.camera.frames_zarr import open_zarr
 from gramoscope.camera.pattern import FramePattern, is_inside
-from gramoscope.conventions import FloatArray
+from gramoscope.conventions import BoolArray, FloatArray
 from gramoscope.errors import ManifestError, NoFramesError, require
 from gramoscope.signal_path import FrameGroup, ImageArray
 
@@ -101,7 +100,7 @@ class Capture:
             If there is no such group.
         """
         stored = self.source.read_group(number, contents or Contents())
-        return self._group(number, lambda images, valid, remarks: self._read_into(images, valid, remarks, stored))
+        return self._group(number, lambda remarks: self._read(stored, remarks))
 
     def unread_group(self, number: int, why: str) -> FrameGroup:
         """Return a stretch none of whose frames could be read, for a reason that is not in the capture.
@@ -112,16 +111,17 @@ class Capture:
         why : str
             For the group's problems.
         """
-        return self._group(number, lambda images, valid, remarks: remarks.add(why))
 
-    def _group(self, number: int, fill: Callable[[ImageArray, npt.NDArray[np.bool_], _Remarks], None]) -> FrameGroup:
+        def nothing(remarks: _Remarks) -> tuple[ImageArray, BoolArray]:
+            remarks.add(why)
+            return self._developed([], remarks)
+
+        return self._group(number, nothing)
+
+    def _group(self, number: int, read: Callable[[_Remarks], tuple[ImageArray, BoolArray]]) -> FrameGroup:
         require(0 <= number < self.group_count, f"group {number}", f"0 … {self.group_count - 1}")
-        sequence, sensor = self.bench.sequence, self.bench.sensor
-        images: ImageArray = np.empty((sequence.frames_per_group, sensor.height_px, sensor.width_px), sensor.dtype)
-        valid = np.zeros(sequence.frames_per_group, np.bool_)
-        remarks = _Remarks()
-        fill(images, valid, remarks)
-        images[~valid] = 0
+        sensor, remarks = self.bench.sensor, _Remarks()
+        images, valid = read(remarks)
         arc_start_m, stage_m = self._places(number, remarks)
         return FrameGroup(
             number=number,
@@ -134,25 +134,34 @@ class Capture:
             problems=remarks.in_words(),
         )
 
-    def _read_into(
-        self, images: ImageArray, valid: npt.NDArray[np.bool_], remarks: _Remarks, stored: Iterator[Frame | Lost]
-    ) -> None:
-        expected = len(images)
-        read = 0
-        for read, frame in enumerate(islice(stored, expected), start=1):
-            if isinstance(frame, Lost):
-                remarks.add(frame.why, *range(read - 1, expected if frame.rest else read))
-                if frame.rest:
-                    return
-                continue
-            remark = develop(frame, sensor=self.bench.sensor, out=images[read - 1])
-            valid[read - 1] = not isinstance(remark, Unusable)
-            if remark is not None:
-                remarks.add(remark, read - 1)
-        if read < expected:
-            remarks.add(f"the file ends after {read} of {expected} frames", *range(read, expected))
-        elif not isinstance(next(stored, Lost("")), Lost):
+    def _read(self, stored: Iterator[Frame | Lost], remarks: _Remarks) -> tuple[ImageArray, BoolArray]:
+        """Return the frames of a group, and which of them are valid."""
+        expected = self.bench.sequence.frames_per_group
+        frames = list(islice(stored, expected))
+        broken = bool(frames) and isinstance(frames[-1], Lost) and frames[-1].rest
+        images = as_they_lie(frames, sensor=self.bench.sensor) if len(frames) == expected else None
+        found = (images, np.ones(expected, np.bool_)) if images is not None else self._developed(frames, remarks)
+        if len(frames) < expected and not broken:
+            remarks.add(f"the file ends after {len(frames)} of {expected} frames", *range(len(frames), expected))
+        elif not broken and not isinstance(next(stored, Lost("")), Lost):
             remarks.add(f"there are more than {expected} frames: the rest is not used")
+        return found
+
+    def _developed(self, frames: Sequence[Frame | Lost], remarks: _Remarks) -> tuple[ImageArray, BoolArray]:
+        """Make pictures of the frames that were stored; those that are lost or useless are black."""
+        sequence, sensor = self.bench.sequence, self.bench.sensor
+        images: ImageArray = np.empty((sequence.frames_per_group, sensor.height_px, sensor.width_px), sensor.dtype)
+        valid = np.zeros(sequence.frames_per_group, np.bool_)
+        for number, frame in enumerate(frames):
+            if isinstance(frame, Lost):
+                remarks.add(frame.why, *range(number, len(images) if frame.rest else number + 1))
+                continue
+            remark = develop(frame, sensor=sensor, out=images[number])
+            valid[number] = not isinstance(remark, Unusable)
+            if remark is not None:
+                remarks.add(remark, number)
+        images[~valid] = 0
+        return images, valid
 
     def _places(self, number: int, remarks: _Remarks) -> tuple[FloatArray, FloatArray]:
         nominal = nominal_arc_m(number, sequence=self.bench.sequence)

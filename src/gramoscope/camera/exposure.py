@@ -9,9 +9,10 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from gramoscope.camera.film_line import film_line
 from gramoscope.conventions import BoolArray, FloatArray
 from gramoscope.quality import Quality
-from gramoscope.signal_path import FrameGroup
+from gramoscope.signal_path import FrameGroup, ImageArray
 
 Frame = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
 
@@ -33,20 +34,26 @@ def _sums(row, white_level):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _levels(frames, every, white_level):  # type: ignore[no-untyped-def]
-    """Mean and standard deviation of the pixels of each frame, and the share of those at full scale, in some of its rows."""
-    levels = np.empty((len(frames), 3))
-    for k in range(len(frames)):
+def _levels_along(film, step, shape, every, white_level):  # type: ignore[no-untyped-def]
+    frames, height, width = shape
+    levels = np.empty((frames, 3))
+    for k in range(frames):
         total, square, full, pixels = 0.0, 0.0, 0, 0
-        for y in range(0, frames.shape[1], every):
-            row_total, row_square, row_full = _sums(frames[k, y], np.float32(white_level))
+        for y in range(0, height, every):
+            first = k * step + y * width
+            row_total, row_square, row_full = _sums(film[first : first + width], np.float32(white_level))
             total += row_total
             square += row_square
             full += row_full
-            pixels += frames.shape[2]
+            pixels += width
         mean = total / pixels
         levels[k] = mean, np.sqrt(max(square / pixels - mean * mean, 0.0)), full / pixels
     return levels
+
+
+def _levels(frames: ImageArray, every: int, white_level: int) -> FloatArray:
+    """Mean and standard deviation of the pixels of each frame, and the share of those at full scale, in some of its rows."""
+    return np.asarray(_levels_along(*film_line(frames), frames.shape, every, white_level))
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,9 @@ the rows. A colour pixel becomes the rounded mean of its channels, so that grey 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -97,6 +98,36 @@ def develop(frame: Frame, *, sensor: Sensor, out: ImageArray) -> str | None:
     fitted, remark = fit_to_bits(grey, bits=sensor.bits)
     out[...] = mirror(fitted, columns=sensor.columns, rows=sensor.rows)
     return remark
+
+
+def as_they_lie(frames: Sequence[Frame | Lost], *, sensor: Sensor) -> ImageArray | None:
+    """Return the canonical grey pictures of a group where they lie, if that is what was stored; nothing is copied.
+
+    Parameters
+    ----------
+    frames : sequence of arrays or Lost
+        As stored.
+    sensor : Sensor
+
+    Returns
+    -------
+    uint8 or uint16 array, shape (frame, row, column), or None
+        None if a frame is lost or has to be made (`develop`), or if they do not lie at even distances in one array.
+    """
+    whole = [frame for frame in frames if not isinstance(frame, Lost)]
+    shape, item = (sensor.height_px, sensor.width_px), np.dtype(sensor.dtype).itemsize
+    mirrored = sensor.columns != "forward" or sensor.rows != "inward"
+    if len(whole) < max(len(frames), 1) or sensor.bits != 8 * item or mirrored:
+        return None
+    if any(one.dtype != sensor.dtype or one.shape != shape or not one.flags.carray for one in whole):
+        return None
+    together = len(whole) == 1 or (whole[0].base is not None and all(one.base is whole[0].base for one in whole))
+    begin = [int(one.__array_interface__["data"][0]) for one in whole]
+    apart = begin[1] - begin[0] if len(begin) > 1 else whole[0].nbytes
+    even = all(after - before == apart for before, after in pairwise(begin))
+    if not together or not even or apart < whole[0].nbytes or apart % item:
+        return None
+    return np.lib.stride_tricks.as_strided(whole[0], (len(whole), *shape), (apart, *whole[0].strides))
 
 
 def wrong_size(width_px: int, height_px: int, *, sensor: Sensor) -> str:

@@ -14,6 +14,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from gramoscope.camera.film_line import film_line
 from gramoscope.conventions import BoolArray, Float32Array, FloatArray, IntArray
 from gramoscope.pickup.device import Kept
 from gramoscope.pickup.registration import cubic_taps, placement
@@ -96,7 +97,7 @@ def _add_frames(film, shape, places, taps, rows, run, sums, total):  # type: ign
 
     Where all of them reach they are added up as whole numbers, whose sum is interpolated; the ends of each by itself.
     """
-    height, width = shape
+    step, width = shape
     common_start, common_stop = run
     for _, start, stop, _ in places:
         common_start, common_stop = max(common_start, start), min(common_stop, stop)
@@ -107,10 +108,10 @@ def _add_frames(film, shape, places, taps, rows, run, sums, total):  # type: ign
         if common_stop > common_start:
             line[:] = 0
             for k, _, _, offset in places:
-                _add_integers(film, (k * height + rows[0] + j) * width + common_start + offset - 1, line)
+                _add_integers(film, k * step + (rows[0] + j) * width + common_start + offset - 1, line)
             _interpolate(line, taps, total[j, common_start - run[0] : common_stop - run[0]])
     for k, start, stop, offset in places:
-        pixel = (k * height + rows[0]) * width + offset - 1
+        pixel = k * step + rows[0] * width + offset - 1
         for first, last in (
             (max(start, run[0]), min(stop, common_start)),
             (max(start, common_stop), min(stop, run[1])),
@@ -136,10 +137,11 @@ def _overlay_run(film, shape, places, fraction, share, rows, run, sums, total, c
 
 @numba.njit(cache=True, nogil=True)
 def _overlay(film, shape, places, fraction, share, wanted, sums, columns):  # type: ignore[no-untyped-def]
+    """Draw the wanted tiles of frames that lie so far apart in a line of film, in rows of such a width."""
     tiles = wanted.shape[1]
     total = np.empty((TILE_ROWS, RUN_TILES * TILE_COLUMNS), np.float32)
     for block in range(wanted.shape[0]):
-        rows = (block * TILE_ROWS, min((block + 1) * TILE_ROWS, shape[0]))
+        rows = (block * TILE_ROWS, min((block + 1) * TILE_ROWS, columns.shape[1]))
         tile = 0
         while tile < tiles:
             first = tile
@@ -221,10 +223,10 @@ def overlay(
     columns = np.zeros((canvas_width, height), np.float32)
     tiles = all_tiles((height, canvas_width)) if wanted is None else wanted
     share = (1 / np.maximum(counts, 1)).astype(np.float32)
-    film = np.ascontiguousarray(images)
+    film, step = film_line(images)
     places, fraction = _by_fraction(shift_px, width, canvas_width)
     sums = np.empty(RUN_TILES * TILE_COLUMNS + 3, sum_type(images))
-    _overlay(film.reshape(-1), (height, width), places, fraction, share, tiles, sums, columns)
+    _overlay(film, (step, width), places, fraction, share, tiles, sums, columns)
     covered = np.flatnonzero(counts)
     if covered.size:
         columns[: covered[0]] = columns[covered[0]]

@@ -22,6 +22,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from gramoscope.camera.film_line import film_line
 from gramoscope.conventions import Float32Array, FloatArray
 from gramoscope.signal_path import FrameGroup, ImageArray, Texture
 
@@ -260,11 +261,19 @@ def _pair_shift(here, there, rows, expected_px, reach_px, rounds):  # type: igno
 
 
 @numba.njit(cache=True, nogil=True)
-def _pair_shifts(images, index, expected_px, share):  # type: ignore[no-untyped-def]
+def _frame_of(film, step, shape, k):  # type: ignore[no-untyped-def]
+    return film[k * step : k * step + shape[1] * shape[2]].reshape(shape[1], shape[2])
+
+
+@numba.njit(cache=True, nogil=True)
+def _pair_shifts(film, step, shape, index, expected_px, share):  # type: ignore[no-untyped-def]
     found_px = np.empty(expected_px.size)
-    rows = _textured_rows(images[index[0]], share, ENOUGH_ROWS)
+    here = _frame_of(film, step, shape, index[0])
+    rows = _textured_rows(here, share, ENOUGH_ROWS)
     for i in range(found_px.size):
-        found_px[i] = _pair_shift(images[index[i]], images[index[i + 1]], rows, expected_px[i], REACH_PX, ROUNDS)
+        there = _frame_of(film, step, shape, index[i + 1])
+        found_px[i] = _pair_shift(here, there, rows, expected_px[i], REACH_PX, ROUNDS)
+        here = there
     return found_px
 
 
@@ -333,7 +342,9 @@ def frame_shifts(group: FrameGroup) -> tuple[FloatArray, FloatArray]:
         nominal step is used in `shift_px`).
     """
     expected_px = expected_steps_px(group)
-    return added_up(group, expected_px, _pair_shifts(group.images, np.flatnonzero(group.valid), expected_px, TEXTURED))
+    film, step = film_line(group.images)
+    usable = np.flatnonzero(group.valid)
+    return added_up(group, expected_px, _pair_shifts(film, step, group.images.shape, usable, expected_px, TEXTURED))
 
 
 def expected_steps_px(group: FrameGroup) -> FloatArray:

@@ -321,8 +321,8 @@ def forward(
         *moves.stacked, moves.model, moves.agitation, readings.bin, readings.source, readings.h,
         readings.value, readings.variance, readings.gate_variance,
         (rule.width, rule.patience, rule.anywhere, rule.doubt), may, lost,
-        begin.mean.copy(), begin.covariance.copy(), begin.missed.copy(), begin.since.copy(), want, means, toward.reshape(-1, size),
-        misses, sinces, used, nu, spread, gain, expected, resume, m_resume, p_resume,
+        begin.mean.copy(), begin.covariance.copy(), begin.missed.copy(), begin.since.copy(), want, means,
+        toward.reshape(-1, size), misses, sinces, used, nu, spread, gain, expected, resume, m_resume, p_resume,
     )  # fmt: skip
     kept = not lost[resume]
     later = FilterState(m_resume, p_resume, kept * misses[resume], kept * sinces[resume])

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from gramoscope.camera.film_line import film_line
 from gramoscope.conventions import Float32Array, FloatArray, IntArray
 from gramoscope.pickup.overlay import overlay_width, sum_type
 from gramoscope.signal_path import ImageArray
@@ -60,10 +61,12 @@ def _sums_of_eight(v, sums):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def cell_energy(images, frames, offset, share, total, energy):  # type: ignore[no-untyped-def]
-    """Write the energy of each cell of the mean of some frames, laid over each other by whole pixels, added up in `total`."""
-    _, height, width = images.shape
-    film = images.reshape(images.size)
+def cell_energy(film, step, width, frames, offset, share, total, energy):  # type: ignore[no-untyped-def]
+    """Write the energy of each cell of the mean of some frames of a line of film, laid over each other by whole pixels.
+
+    They are added up in `total`.
+    """
+    height = energy.shape[1]
     mean, square = np.empty(total.size, np.float32), np.zeros(total.size, np.float32)
     # a column of cells is written a cache line at a time
     part = np.empty((ROWS, len(energy)), np.float32)
@@ -72,7 +75,7 @@ def cell_energy(images, frames, offset, share, total, energy):  # type: ignore[n
         for row in range(first, stop):
             total[:] = 0
             for k in range(frames.size):
-                _add_pixels(film, (frames[k] * height + row) * width, total, offset[k], width)
+                _add_pixels(film, frames[k] * step + row * width, total, offset[k], width)
             _scale(total, share, mean)
             _squares(mean[1:-5], mean[2:-4], mean[4:-2], mean[5:-1], square[3:-3])
             _sums_of_eight(square, part[row - first])
@@ -100,7 +103,8 @@ def sharpness(images: ImageArray, shift_px: FloatArray, *, ceiling: float = CEIL
     frames, offset, share = whole_pixels(images.shape[2], shift_px)
     width = share.size
     energy = np.empty((width // CELL_PX, images.shape[1]), np.float32)
-    cell_energy(np.ascontiguousarray(images), frames, offset, share, np.empty(width, sum_type(images)), energy)
+    total = np.empty(width, sum_type(images))
+    cell_energy(*film_line(images), images.shape[2], frames, offset, share, total, energy)
     return sharpness_of(energy, ceiling=ceiling)
 
 
