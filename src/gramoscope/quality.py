@@ -90,7 +90,11 @@ def count(flags: FlagArray) -> dict[str, int]:
     dict
         Lower-case flag name → number of samples, for every flag, zeros included.
     """
-    return {str(flag.name).lower(): int(np.count_nonzero(flags & np.uint16(flag))) for flag in Quality}
+    there = int(np.bitwise_or.reduce(flags, axis=None))
+    return {
+        str(flag.name).lower(): int(np.count_nonzero(flags & np.uint16(flag))) if there & flag else 0
+        for flag in Quality
+    }
 
 
 def interpolated_share(flags: FlagArray) -> float:

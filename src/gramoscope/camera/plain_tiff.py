@@ -7,6 +7,7 @@ in strips, of changing sizes, with a broken chain) is left to tifffile, page by 
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -65,7 +66,7 @@ def _places(tiff: tifffile.TiffFile, data: Bytes) -> list[int]:
         directory = data[head:end]
         if not places:
             model = directory
-            free, at = _free(np.frombuffer(model.tobytes(), entry), form.offsetsize)
+            free, at = _free(model.tobytes(), entry, form.offsetsize)
         if directory.size != free.size or at < 0 or ((directory != model) & ~free).any():
             return []
         places.append(int(directory[at : at + form.offsetsize].view(place_type)[0]))
@@ -73,8 +74,13 @@ def _places(tiff: tifffile.TiffFile, data: Bytes) -> list[int]:
     return places
 
 
-def _free(directory: Any, place_bytes: int) -> tuple[npt.NDArray[np.bool_], int]:
-    """Which bytes of a directory may be others on other pages, and where the place of the pixels is; −1 if it is not plain."""
+@lru_cache(maxsize=16)
+def _free(entries: bytes, entry: np.dtype[Any], place_bytes: int) -> tuple[npt.NDArray[np.bool_], int]:
+    """Which bytes of a directory may be others on other pages, and where the place of the pixels is; −1 if it is not plain.
+
+    Remembered, for it is the same in all files of a film.
+    """
+    directory = np.frombuffer(entries, entry)
     bytes_ = np.where(directory["type"] < _TYPE_BYTES.size, _TYPE_BYTES[directory["type"] % _TYPE_BYTES.size], 0)
     here = (bytes_ > 0) & (bytes_ * directory["count"] <= place_bytes)
     words, strip = np.isin(directory["tag"], _WORDS), directory["tag"] == _STRIP_OFFSETS

@@ -20,7 +20,7 @@ from functools import cached_property
 
 import numba
 import numpy as np
-from scipy import fft, ndimage, signal
+from scipy import fft, ndimage
 
 from gramoscope.conventions import Float32Array, FloatArray
 from gramoscope.errors import require
@@ -66,7 +66,7 @@ def whitening_filter(power: FloatArray, band: Band) -> FloatArray:
     gain *= 1 - np.exp(-((frequency / (0.6 * band.low)) ** 4))
     response = np.fft.fftshift(fft.irfft(gain / gain.max()))
     middle = response.size // 2
-    window = signal.get_window(("kaiser", 6.0), WHITENER_TAPS, fftbins=False)
+    window = np.kaiser(WHITENER_TAPS, 6.0)
     taps = response[middle - WHITENER_TAPS // 2 : middle + WHITENER_TAPS // 2 + 1] * window
     return np.asarray(taps - window * taps.sum() / window.sum())
 
