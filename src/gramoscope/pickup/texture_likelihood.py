@@ -17,11 +17,19 @@ from scipy import ndimage
 
 from gramoscope.apparatus.bench import Bench
 from gramoscope.camera.exposure import Exposure
-from gramoscope.conventions import INNER, OUTER, Float32Array, FloatArray, IntArray
+from gramoscope.conventions import INNER, OUTER, BoolArray, Float32Array, FloatArray, IntArray
 from gramoscope.errors import require
 from gramoscope.pickup.cartridge import Line, Sketch, Spread
 from gramoscope.pickup.device import Device, Film
-from gramoscope.pickup.overlay import TILE_COLUMNS, Overlay, overlay_width, slope_along, tiles_about, to_phases
+from gramoscope.pickup.overlay import (
+    TILE_COLUMNS,
+    Overlay,
+    frames_in,
+    overlay_width,
+    slope_along,
+    tiles_about,
+    to_phases,
+)
 from gramoscope.pickup.processor import Processor
 from gramoscope.pickup.registration import overlap_textures, strip_columns
 from gramoscope.pickup.texture.calibration import aligned_layout, calibration_of
@@ -45,6 +53,8 @@ NEARLY_WHITE = 0.97
 """Points brighter than this share of full scale are burnt out."""
 SEARCH_MARGIN_PX = -16.0
 """The coarse search looks for stripes so far beyond the glass edge: in the mixed zone they are faint, but there."""
+BESIDE_PX = 24
+"""Columns at either end rest on few frames, and are read no further than the whitener reaches from the others."""
 SURPRISE_LIMITS = (0.7, 9.0)
 """A stretch whose scores are weaker or stronger than what was learned has its error bars changed by the root of it."""
 
@@ -254,13 +264,18 @@ class TexturePickup:
         layout = model.layout
         rows = layout.rows(stretch.displacement_px)
         visible = layout.visible(rows, half_px=model.half_px)
+        shown = slice(stretch.first_column, min(stretch.first_column + rows.shape[1], image.shape[1]))
         lines = []
         for number, wall in enumerate(layout.wall):
             measured = visible[number] & (found.information[wall] > 0)
             if model.stripes[number] is not None:
                 lowest = layout.from_bottom_px[number] == layout.from_bottom_px[layout.wall == wall].min()
                 name = f"{'inner' if wall == INNER else 'outer'} wall, {'lower' if lowest else 'upper'} stripe"
-                lines.append(Line(name, rows[number, : image.shape[1]], measured[: image.shape[1]]))
+                line = Line(name, np.full(image.shape[1], np.nan), np.zeros(image.shape[1], np.bool_))
+                line.row[shown], line.measured[shown] = (
+                    one[: shown.stop - shown.start] for one in (rows[number], measured)
+                )
+                lines.append(line)
         return Sketch(image, tuple(lines))
 
     def stretch(self, film: Film, sight: Sight, coarse: Coarse) -> tuple[Stretch, Overlay]:
@@ -275,25 +290,29 @@ class TexturePickup:
         """
         group, device = film.group, film.device
         shift_px = to_phases(sight.shift_px)
-        width = overlay_width(group.images.shape[2], shift_px)
-        x = np.arange(width)
+        height, width = group.images.shape[1], overlay_width(group.images.shape[2], shift_px)
+        frames = frames_in(group.images.shape[2], shift_px)
+        usable = frames * 2 >= frames.max()
+        read = _worth_reading(usable)
+        x = np.arange(read.start, read.stop)
         cell: FloatArray = (np.arange(coarse[0].shape[1], dtype=np.float64) + 0.5) * CELL_PX - 0.5
         path = _by_column(coarse[0], x, cell, smooth_cells=1.5)
         support = _by_column(coarse[1], x, cell, smooth_cells=SUPPORT_CELLS)
         walls = np.array([support[self.layout.wall == wall].max(axis=0, initial=0.0) for wall in (INNER, OUTER)])
         path = settled(path, walls, self.cartridge.bench.disc.cut, self.cartridge.rules)
         half_px = self.cartridge.learning.half_px
-        rows = self.layout.rows(path)
-        rows[~self.layout.visible(rows, half_px=half_px - WANDER_PX)] = np.nan
+        rows = np.full((self.layout.wall.size, width), np.nan)
+        rows[:, read] = self.layout.rows(path)
+        rows[:, read][~self.layout.visible(rows[:, read], half_px=half_px - WANDER_PX)] = np.nan
         reach_px = wide_rows(half_px) / 2 + TAPS / 2 + WANDER_PX
-        wanted = tiles_about(rows, (group.images.shape[1], width), reach_px=reach_px)
+        wanted = tiles_about(rows, (height, width), reach_px=reach_px)
         for end in strip_columns(group, width=width, group_step_m=self.cartridge.bench.sequence.group_step_m):
             tiles = slice(end.start // TILE_COLUMNS, -(-end.stop // TILE_COLUMNS))
             wanted[:, tiles] = wanted[:, tiles].any(axis=1, keepdims=True)
         laid = device.overlay(film, shift_px, np.flatnonzero(group.valid), wanted)
-        usable = laid.frames * 2 >= laid.frames.max()
-        burnt = device.places_brighter(laid.columns, NEARLY_WHITE * group.white_level)
-        return Stretch(laid.columns, usable, burnt, path, support, device=device), laid
+        columns = laid.columns[read]
+        burnt = device.places_brighter(columns, NEARLY_WHITE * group.white_level)
+        return Stretch(columns, usable[read], burnt, path, support, device=device, first_column=read.start), laid
 
     def models_for(self, number: int) -> list[Model]:
         """Return the models by which a group is read, round by round: none that the group itself has taught."""
@@ -312,7 +331,7 @@ class TexturePickup:
         nothing = np.full(place_px.shape, np.nan)
         return WallTrace(
             number=group.number,
-            arc_start_m=float(group.arc_start_m[first]) + 0.5 * (STRIDE_PX - 1) * pitch,
+            arc_start_m=float(group.arc_start_m[first]) + (stretch.first_column + 0.5 * (STRIDE_PX - 1)) * pitch,
             arc_step_m=pitch * STRIDE_PX,
             offset_m=place_px * pitch + float(group.stage_m[first]),
             offset_sigma_m=sigma_px * pitch,
@@ -340,6 +359,13 @@ class TexturePickup:
             flags=no_flags(2, samples) | np.uint16(flags | UNSEEN),
             problems=problems,
         )
+
+
+def _worth_reading(usable: BoolArray) -> slice:
+    """Return the columns that are read: the usable ones, and on either side as many as their filters reach."""
+    inside = np.flatnonzero(usable)
+    first = max(int(inside[0]) - BESIDE_PX, 0) // STRIDE_PX * STRIDE_PX
+    return slice(first, min(int(inside[-1]) + 1 + BESIDE_PX, usable.size))
 
 
 def _by_column(cells: FloatArray, x: IntArray, cell: FloatArray, *, smooth_cells: float) -> FloatArray:

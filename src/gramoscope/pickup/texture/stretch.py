@@ -32,6 +32,8 @@ class Stretch:
         In which the picture is seen: before it is interpolated, for bright grains ring less then.
     device : Device
         Where the picture lies and is heard.
+    first_column : int
+        Where it begins, in columns of the first frame.
     """
 
     columns: Kept
@@ -41,6 +43,7 @@ class Stretch:
     support: FloatArray
     tone: Tone = AS_IT_IS
     device: Device = field(default_factory=Processor)
+    first_column: int = 0
 
     def in_tone(self, tone: Tone) -> Stretch:
         """Return the same stretch seen in a tone; only a picture that is as it was can be seen in another one."""
