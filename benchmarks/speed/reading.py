@@ -3,13 +3,14 @@
     python -m benchmarks.speed.reading [--groups 512] [--device cuda] [--table benchmarks/speed/reading.md]
 
 Films a melody with the simulator (12 frames of 1280 × 512 a group), lets the cartridge learn, and times each stage on one
-thread, then the whole on one and on two. Bytes and shares are those of the roofline (`ceilings`), measured in the same run.
-The real-time factor is the time that a stretch of groove sounds over the time that it takes.
+thread, then the whole on one and on two, and with a third that reads while others wait for the interpreter. Bytes and shares
+are those of the roofline (`ceilings`), measured in the same run. The real-time factor is the time that a stretch of groove sounds over the time that it takes.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import tempfile
 import time
 from collections.abc import Callable
@@ -150,6 +151,7 @@ def measured_rows(groups: int, device: Device) -> tuple[list[Row], Capture, int]
         *following_stages(capture, traces),
         ("in all, one thread for reading", played(capture, pickup, film, 1), film_bytes),
         ("in all, two threads for reading", played(capture, pickup, film, 2), film_bytes),
+        ("in all, three threads for reading", played(capture, pickup, film, 3), film_bytes),
     ]
     return rows, capture, film[0].images.size
 
@@ -165,7 +167,7 @@ def page(rows: list[Row], capture: Capture, pixels: int, ceilings: Ceilings, dev
         "",
         f"{bench.sequence.frames_per_group} frames of {bench.sensor.width_px} × {bench.sensor.height_px}, 8 bits, "
         f"{bench.rotation.radius_m * 1e3:g} mm, {bench.sequence.groups} groups, frames in memory, read on {device}. "
-        "Measured in the same run, on one thread of the processor: triad "
+        f"Measured in the same run, on one thread of a machine of {os.cpu_count()} processors: triad "
         f"{ceilings.triad_bytes_s / 1e9:.1f} GB/s, {ceilings.fma_s / 1e9:.0f} · 10⁹ single-precision multiply-adds a second.",
         "*Of the memory's rate*: what the stage has to read of the film, over what the triad moves in that time. "
         "*Real-time factor*: 1 plays as fast as the record turns.",
