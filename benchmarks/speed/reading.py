@@ -4,7 +4,8 @@
 
 Films a melody with the simulator (12 frames of 1280 × 512 a group), lets the cartridge learn, and times each stage on one
 thread, then the whole on one and on two, and with a third that reads while others wait for the interpreter. Bytes and shares
-are those of the roofline (`ceilings`), measured in the same run. The real-time factor is the time that a stretch of groove sounds over the time that it takes.
+are those of the roofline (`ceilings`), measured in the same run. The real-time factor is the time that a stretch of groove
+sounds over the time that it takes.
 """
 
 from __future__ import annotations
