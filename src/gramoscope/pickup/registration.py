@@ -24,6 +24,7 @@ import numpy.typing as npt
 
 from gramoscope.camera.film_line import film_line
 from gramoscope.conventions import Float32Array, FloatArray
+from gramoscope.quantile import quantile
 from gramoscope.signal_path import FrameGroup, ImageArray, Texture
 
 STRIP_REACH_PX = 40
@@ -192,7 +193,7 @@ def _textured_rows(image, share, most):  # type: ignore[no-untyped-def]
     power = np.empty(image.shape[0])
     for row in range(power.size):
         power[row] = _row_texture(image[row, :-4], image[row, 4:])
-    power -= np.quantile(power, 0.25)
+    power -= quantile(power, 0.25)
     largest = power.max()
     rows = np.flatnonzero(power >= share * largest) if largest > 0 else np.arange(power.size)
     return rows[:: -(-rows.size // most)]

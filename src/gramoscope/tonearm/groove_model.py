@@ -15,6 +15,7 @@ import numba
 import numpy as np
 
 from gramoscope.conventions import BoolArray, FloatArray, IntArray
+from gramoscope.quantile import quantile
 from gramoscope.tonearm.bryson_frazier import Smoothed, backward
 from gramoscope.tonearm.groove_prior import SLOPE, GroovePrior, start
 from gramoscope.tonearm.linear_gaussian import (
@@ -291,7 +292,7 @@ def _excess(bins, surprise, size):  # type: ignore[no-untyped-def]
     for first in range(0, size, AGITATION_BINS // 2):
         near = surprise[np.searchsorted(bins, first) : np.searchsorted(bins, first + AGITATION_BINS)]
         if near.size >= AGITATION_BINS // 2:
-            ratio = np.median(near) / NORMAL_MEDIAN
+            ratio = quantile(near, 0.5) / NORMAL_MEDIAN
             if ratio > AGITATED:
                 for k in range(first, min(first + AGITATION_BINS, size)):
                     excess[k] = max(excess[k], ratio)

@@ -18,6 +18,7 @@ import numpy as np
 
 from gramoscope.conventions import INNER, OUTER, FloatArray
 from gramoscope.disc.formats import Direction
+from gramoscope.quantile import quantile
 from gramoscope.tonearm.groove_prior import BEND_M
 from gramoscope.tonearm.stretches import Stretch
 
@@ -109,7 +110,7 @@ def _bend_power(place_m, variance, lag):  # type: ignore[no-untyped-def]
             seen += 1
     if seen < LEAST_SAMPLES:
         return np.nan
-    return (NORMAL * np.median(bends[:seen])) ** 2 - np.median(noise[:seen])
+    return (NORMAL * quantile(bends[:seen], 0.5)) ** 2 - quantile(noise[:seen], 0.5)
 
 
 def slope_power(one: OneDirection, step_m: float) -> float:

@@ -269,7 +269,8 @@ class GrooveSearch:
         # what the cut does not use changes slowly: a step of one grid point costs as much as a cell without its stripes
         costs = np.array([self.step_cost * GRID_PX if use else 1.0 for use in used])
         absent = np.float32(self.absent)
-        path, _ = _common_path(coarse, swing.astype(np.float32), first_row, seen, absent, steps[::-1], costs[::-1])
+        steps, costs = steps[::-1].copy(), costs[::-1].copy()
+        path, _ = _common_path(coarse, swing.astype(np.float32), first_row, seen, absent, steps, costs)
         return lateral[path[1]].astype(np.float64), vertical[path[0]].astype(np.float64)
 
     def _own_paths(
@@ -294,7 +295,7 @@ def _ridge_at(ridge, cell, place, limits):  # type: ignore[no-untyped-def]
 def _own(ridge, rest_row, wall, limits, reach, step_cost, path, support):  # type: ignore[no-untyped-def]
     """Move the path of each wall to where its stripes are, and write how sharp they are there."""
     steps, costs = np.array([0, 3]), np.array([0.0, step_cost])
-    score = np.empty((len(ridge), 1, 2 * reach + 1))
+    score = np.empty((len(ridge), 1, 2 * reach + 1), ridge.dtype)
     for w in (INNER, OUTER):
         for cell in range(len(ridge)):
             for k in range(2 * reach + 1):

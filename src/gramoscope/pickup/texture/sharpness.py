@@ -14,6 +14,7 @@ import numpy as np
 from gramoscope.camera.film_line import film_line
 from gramoscope.conventions import Float32Array, FloatArray, IntArray
 from gramoscope.pickup.overlay import overlay_width, sum_type
+from gramoscope.quantile import quantile
 from gramoscope.signal_path import ImageArray
 
 CELL_PX = 8
@@ -168,12 +169,12 @@ def _limit(cell, gain, ceiling):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True, nogil=True)
 def _relate(sharp, usual, ceiling):  # type: ignore[no-untyped-def]
     """Turn energies into amplitudes above the noise (what quiet rows usually have), a typical cell's largest being 1."""
-    noise = np.float32(np.quantile(usual, QUIETEST))
+    noise = np.float32(quantile(usual, QUIETEST))
     peak = np.empty(len(sharp), np.float32)
     for cell in range(len(sharp)):
         _root_above(sharp[cell], noise)
         peak[cell] = sharp[cell].max()
-    reference = np.median(peak)
+    reference = quantile(peak, 0.5)
     gain = np.float32(1 / reference) if reference > 0 else np.float32(0)
     for cell in range(len(sharp)):
         _limit(sharp[cell], gain, ceiling)
