@@ -4,7 +4,7 @@ import pytest
 from gramoscope.apparatus.bench import Sequence
 from gramoscope.apparatus.capture import open_capture
 from gramoscope.apparatus.capture_writer import CaptureWriter
-from gramoscope.apparatus.frame_log import nominal_arc_m, read_log
+from gramoscope.apparatus.frame_log import believed_places, nominal_arc_m, read_log
 
 SEQUENCE = Sequence(groups=3, frames_per_group=2, frame_step_m=0.8e-6, group_step_m=469e-6)
 HEADER = "group,frame,arc_um,time_s"
@@ -101,3 +101,53 @@ def test_a_capture_whose_log_is_gone_plays_at_nominal_places(tmp_path, bench, fi
     capture = open_capture(folder)
     assert capture.problems == ("frames.csv is missing; nominal places are used",)
     np.testing.assert_allclose(capture.group(4).arc_start_m, nominal_arc_m(4, sequence=bench.sequence))
+
+
+def test_a_slip_of_the_encoder_is_put_where_the_other_frames_lead_to_expect_it():
+    nominal = 16e-6 * np.arange(6)
+    logged = nominal + 3e-3 + 1e-6 * np.array([0, 1, -1, 0, 2, 0])
+    found, slipped = believed_places(logged, nominal, width_m=500e-6)
+    np.testing.assert_array_equal(found, logged)
+    assert not slipped.any()
+    for wrong in (5e-3, -2e-3, 1.0):
+        one = logged.copy()
+        one[3] += wrong
+        found, slipped = believed_places(one, nominal, width_m=500e-6)
+        assert np.flatnonzero(slipped).tolist() == [3]
+        np.testing.assert_allclose(found, logged, atol=3e-6)
+    half = logged.copy()
+    half[4:] += 1e-3
+    found, slipped = believed_places(half, nominal, width_m=500e-6)
+    assert np.flatnonzero(slipped).tolist() == [4, 5]
+    np.testing.assert_allclose(found, logged, atol=10e-6)
+
+
+def test_what_is_not_known_is_not_doubted_and_two_frames_far_apart_are_not_believed():
+    nominal = 16e-6 * np.arange(4)
+    gaps = np.array([np.nan, 16e-6, np.nan, 48e-6])
+    found, slipped = believed_places(gaps, nominal, width_m=500e-6)
+    np.testing.assert_array_equal(found, gaps)
+    assert not slipped.any()
+    one = np.array([np.nan, 7.0, np.nan, np.nan])
+    np.testing.assert_array_equal(believed_places(one, nominal, width_m=500e-6)[0], one)
+    found, slipped = believed_places(np.array([0.0, 5e-3]), nominal[:2], width_m=500e-6)
+    np.testing.assert_array_equal(found, nominal[:2])
+    assert slipped.all()
+
+
+def test_a_slip_in_the_log_of_a_capture_is_told(tmp_path, bench, film, write):
+    folder = write(tmp_path / "c", bench, film(bench))
+    rows = (folder / "frames.csv").read_text("utf-8").splitlines()
+    header, place = rows[0].split(","), next(i for i, row in enumerate(rows) if row.startswith("2,1,"))
+    fields = rows[place].split(",")
+    fields[header.index("arc_um")] = "99999999"
+    rows[place] = ",".join(fields)
+    before = open_capture(folder).group(2)
+    (folder / "frames.csv").write_text("\n".join(rows) + "\n", "utf-8")
+    group = open_capture(folder).group(2)
+    assert group.valid.all()
+    np.testing.assert_allclose(group.arc_start_m, before.arc_start_m, atol=1e-9)
+    (problem,) = group.problems
+    assert "frame 1" in problem
+    assert "far from where the other frames are: not believed" in problem
+    assert before.problems == open_capture(folder).group(1).problems == ()

@@ -11,7 +11,7 @@ from gramoscope.apparatus.bench import Bench, Sequence
 from gramoscope.errors import ArgumentError
 from gramoscope.pickup.texture.reading import Evidence
 from gramoscope.pickup.texture.stretch import Stretch
-from gramoscope.pickup.texture_likelihood import STRIDE_PX, TextureLikelihood, samples_of
+from gramoscope.pickup.texture_likelihood import STRIDE_PX, TextureLikelihood, samples_of, worth_reading
 from gramoscope.quality import Quality
 from gramoscope.signal_path import FrameGroup
 from gramoscope.simulation.scene import filming_bench
@@ -73,6 +73,22 @@ def test_a_stretch_that_surprises_has_wider_error_bars(surprise: float, factor: 
     _, wider = samples_of(stretch, replace(usual, surprise=np.array([1.0, surprise])))
     np.testing.assert_array_equal(wider[0], sigma[0])
     np.testing.assert_allclose(wider[1], factor * sigma[1])
+
+
+@pytest.mark.parametrize(
+    ("usable", "most", "read"),
+    [
+        (slice(0, 200), 1000, slice(0, 200)),
+        (slice(81, 150), 1000, slice(56, 174)),
+        (slice(81, 190), 1000, slice(56, 200)),
+        (slice(10, 190), 64, slice(0, 64)),
+        (slice(81, 190), 64, slice(56, 120)),
+    ],
+)
+def test_columns_that_rest_on_few_frames_are_not_read(usable: slice, most: int, read: slice) -> None:
+    enough = np.zeros(200, bool)
+    enough[usable] = True
+    assert worth_reading(enough, most) == read
 
 
 @pytest.mark.parametrize(("groups", "wanted"), [(1, 1), (5, 5), (64, 64), (65, 64), (6000, 64)])

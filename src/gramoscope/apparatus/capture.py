@@ -16,7 +16,7 @@ import numpy as np
 from gramoscope.apparatus.bench import Bench
 from gramoscope.apparatus.filming import MARKER
 from gramoscope.apparatus.fingerprint import sha256_of_file, sha256_of_files
-from gramoscope.apparatus.frame_log import FrameLog, nominal_arc_m, read_log
+from gramoscope.apparatus.frame_log import FrameLog, believed_places, nominal_arc_m, read_log
 from gramoscope.apparatus.manifest import MANIFEST_NAME, Manifest, read_manifest
 from gramoscope.camera.contents import Contents
 from gramoscope.camera.frames import Frame, FrameSource, Layout, Lost, Unusable, as_they_lie, develop
@@ -167,7 +167,14 @@ class Capture:
         nominal = nominal_arc_m(number, sequence=self.bench.sequence)
         if self.log is None:
             return nominal, np.zeros_like(nominal)
-        arc_m, stage_m = self.log.arc_m[number], self.log.stage_m[number]
+        width_m = self.bench.sensor.width_px * self.bench.sensor.pixel_pitch_m
+        arc_m, slipped = believed_places(self.log.arc_m[number], nominal, width_m=width_m)
+        stage_m = self.log.stage_m[number]
+        if slipped.any():
+            remarks.add(
+                "the place in the log lies far from where the other frames are: not believed",
+                *np.flatnonzero(slipped).tolist(),
+            )
         unknown = np.isnan(arc_m)
         if unknown.any():
             remarks.add("no place in the log: the nominal one is used", *np.flatnonzero(unknown).tolist())

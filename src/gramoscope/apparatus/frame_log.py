@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from gramoscope.apparatus.bench import Sequence
-from gramoscope.conventions import MICROMETRES_PER_METRE, FloatArray
+from gramoscope.conventions import MICROMETRES_PER_METRE, BoolArray, FloatArray
 
 HEADER = ("group", "frame", "arc_um", "time_s")
 STAGE = "stage_um"
@@ -42,6 +42,41 @@ def nominal_arc_m(group: int, *, sequence: Sequence) -> FloatArray:
     """Return where the frames of a group start when nobody logged it: g · group_step + k · frame_step."""
     frame = np.arange(sequence.frames_per_group, dtype=np.float64)
     return np.asarray(group * sequence.group_step_m + frame * sequence.frame_step_m, np.float64)
+
+
+def believed_places(arc_m: FloatArray, nominal_m: FloatArray, *, width_m: float) -> tuple[FloatArray, BoolArray]:
+    """Return where the frames of a group begin, and which of the logged places are not believed.
+
+    Frames of a group overlap: the record turns a little from one to the next. A place that lies further than a quarter of a
+    frame from where the others lead to expect it is a slip of the encoder, and is put where they do.
+
+    Parameters
+    ----------
+    arc_m : float64 array, shape (frame,)
+        As logged; NaN where nothing was, and there nothing is changed.
+    nominal_m : float64 array, shape (frame,)
+        Taken for all where most logged steps are longer than a frame.
+    width_m : float
+        Of a frame.
+
+    Returns
+    -------
+    arc_m : float64 array, shape (frame,)
+    slipped : bool array, shape (frame,)
+    """
+    slipped = np.zeros(arc_m.size, np.bool_)
+    known = np.flatnonzero(np.isfinite(arc_m))
+    if known.size < 2:
+        return arc_m, slipped
+    step_m = float(np.median(np.diff(arc_m[known]) / np.diff(known)))
+    if abs(step_m) > width_m:
+        slipped[known] = True
+        return np.where(slipped, nominal_m, arc_m), slipped
+    off_m = arc_m[known] - step_m * known
+    # of an even number the lower one in the middle: there is such a frame, and others near it
+    usual_m = np.sort(off_m)[(known.size - 1) // 2]
+    slipped[known] = np.abs(off_m - usual_m) > width_m / 4
+    return np.where(slipped, usual_m + step_m * np.arange(arc_m.size), arc_m), slipped
 
 
 def read_log(path: Path, *, sequence: Sequence) -> FrameLog:

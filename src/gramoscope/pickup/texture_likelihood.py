@@ -55,6 +55,8 @@ SEARCH_MARGIN_PX = -16.0
 """The coarse search looks for stripes so far beyond the glass edge: in the mixed zone they are faint, but there."""
 BESIDE_PX = 24
 """Columns at either end rest on few frames, and are read no further than the whitener reaches from the others."""
+MOST_COLUMNS = 1 << 14
+"""Of a stretch that is learned from."""
 SURPRISE_LIMITS = (0.7, 9.0)
 """A stretch whose scores are weaker or stronger than what was learned has its error bars changed by the root of it."""
 
@@ -250,6 +252,12 @@ class TexturePickup:
         """Whether the passage was long enough to learn the texture of a stripe at least."""
         return any(stripe is not None for lesson in self.lessons[-1:] for stripe in lesson.whole.stripes)
 
+    @property
+    def most_columns(self) -> int:
+        """So many columns of a stretch are read: as many as the passage's transforms hold, and room between its ends."""
+        lengths = [lesson.whole.length for lesson in self.lessons]
+        return min(lengths) - self.cartridge.learning.largest_lag_px // 2 if lengths else MOST_COLUMNS
+
     def sketch(self, group: FrameGroup) -> Sketch | None:
         """Return one frame and the stripes that were read in it; None when no frame is usable."""
         group, _ = self.cartridge.exposure.sort_out(group)
@@ -293,7 +301,7 @@ class TexturePickup:
         height, width = group.images.shape[1], overlay_width(group.images.shape[2], shift_px)
         frames = frames_in(group.images.shape[2], shift_px)
         usable = frames * 2 >= frames.max()
-        read = _worth_reading(usable)
+        read = worth_reading(usable, self.most_columns)
         x = np.arange(read.start, read.stop)
         cell: FloatArray = (np.arange(coarse[0].shape[1], dtype=np.float64) + 0.5) * CELL_PX - 0.5
         path = _by_column(coarse[0], x, cell, smooth_cells=1.5)
@@ -361,11 +369,11 @@ class TexturePickup:
         )
 
 
-def _worth_reading(usable: BoolArray) -> slice:
+def worth_reading(usable: BoolArray, most: int) -> slice:
     """Return the columns that are read: the usable ones, and on either side as many as their filters reach."""
     inside = np.flatnonzero(usable)
     first = max(int(inside[0]) - BESIDE_PX, 0) // STRIDE_PX * STRIDE_PX
-    return slice(first, min(int(inside[-1]) + 1 + BESIDE_PX, usable.size))
+    return slice(first, min(int(inside[-1]) + 1 + BESIDE_PX, usable.size, first + most))
 
 
 def _by_column(cells: FloatArray, x: IntArray, cell: FloatArray, *, smooth_cells: float) -> FloatArray:

@@ -10,6 +10,7 @@ import pytest
 
 from gramoscope.conventions import INNER, OUTER, FloatArray
 from gramoscope.disc.formats import Cut
+from gramoscope.errors import ArgumentError
 from gramoscope.pickup.overlay import places_brighter
 from gramoscope.pickup.texture import reading
 from gramoscope.pickup.texture.filter_bank import FilterBank
@@ -144,6 +145,15 @@ def test_a_wall_without_support_takes_the_path_of_the_other() -> None:
 def test_walls_of_a_stereo_cut_are_left_alone() -> None:
     path = JITTER.copy()
     np.testing.assert_array_equal(settled(path, np.ones((2, WIDTH)), "stereo", RULES), path)
+
+
+def test_a_stretch_that_is_longer_than_the_passage_taught_is_refused(another: Stretch, layout: StripeLayout) -> None:
+    deaf = FilterBank(*(np.zeros(shape, np.float32) for shape in ((35, 5), (1, 2, 5), (2,), (5, 5))))
+    known = StripeStatistics(deaf, 1.0, 1.0, 0.0, np.ones(35), 900)
+    model = Model(layout, Tone(), np.ones(1), 9, Band(), 864, (known, known))
+    with pytest.raises(ArgumentError, match="a stretch of 900 columns") as told:
+        evidence(another, model, RULES)
+    assert "at most 864" in str(told.value)
 
 
 def test_a_model_is_as_precise_as_all_its_stripes_together(layout: StripeLayout) -> None:

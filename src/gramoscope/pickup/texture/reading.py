@@ -18,6 +18,7 @@ import numpy as np
 
 from gramoscope.conventions import INNER, OUTER, Float32Array, FloatArray
 from gramoscope.disc.formats import Cut
+from gramoscope.errors import require
 from gramoscope.pickup.texture.filter_bank import FilterBank
 from gramoscope.pickup.texture.following import channels, follow
 from gramoscope.pickup.texture.hearing import Ear, add_up, clear_columns, ear_of
@@ -148,6 +149,8 @@ def evidence(stretch: Stretch, model: Model, rules: Rules, *, judged: bool = Tru
     score, information = np.zeros((2, 2, seen.columns.shape[0]))
     if not ear.number.size:
         return Evidence(score, information, np.full(2, np.nan))
+    columns = seen.columns.shape[0]
+    require(columns <= ear.length, f"a stretch of {columns} columns", f"at most {ear.length}, as the passage taught")
     rows, clear = clear_columns(seen, model.layout, ear.number, half_px=ear.half_px, least_support=rules.least_support)
     said, weight = seen.device.heard(ear, seen.columns, rows, clear, power_limits=rules.power_limits)
     add_up(said, weight, ear.wall, ear.trust * ear.information, score, information)
