@@ -4,7 +4,7 @@ import pytest
 from gramoscope.apparatus.bench import Sequence
 from gramoscope.apparatus.capture import open_capture
 from gramoscope.apparatus.capture_writer import CaptureWriter
-from gramoscope.apparatus.frame_log import believed_places, nominal_arc_m, read_log
+from gramoscope.apparatus.frame_log import FrameLog, believed_places, nominal_arc_m, read_log, stands_alone
 
 SEQUENCE = Sequence(groups=3, frames_per_group=2, frame_step_m=0.8e-6, group_step_m=469e-6)
 HEADER = "group,frame,arc_um,time_s"
@@ -151,3 +151,44 @@ def test_a_slip_in_the_log_of_a_capture_is_told(tmp_path, bench, film, write):
     assert "frame 1" in problem
     assert "far from where the other frames are: not believed" in problem
     assert before.problems == open_capture(folder).group(1).problems == ()
+
+
+def _log_of(off_m):
+    sequence = Sequence(groups=len(off_m), frames_per_group=3, frame_step_m=0.8e-6, group_step_m=469e-6)
+    places = np.array([nominal_arc_m(group, sequence=sequence) + off for group, off in enumerate(off_m)])
+    return FrameLog(places, np.zeros_like(places)), sequence
+
+
+def test_a_group_that_no_neighbour_agrees_with_is_put_among_them():
+    log, sequence = _log_of([0.001, 0.001, 0.0012, 10.0, 0.0009, 0.001, np.nan, 0.001])
+    told = [stands_alone(group, log, sequence=sequence, width_m=500e-6) for group in range(8)]
+    assert told[3] == pytest.approx(0.001, abs=1e-4)
+    assert told[:3] + told[4:] == [None] * 7
+
+
+@pytest.mark.parametrize(
+    "off_m", [[0, 0, 0, 0.004, 0, 0], [0, 0, 0, 3.0, 3.0, 3.0], [0, 5.0], [7.0], [0, 0, 3.0, 3.0, 0, 0]]
+)
+def test_a_jump_that_neighbours_agree_on_is_believed(off_m):
+    log, sequence = _log_of(off_m)
+    assert all(stands_alone(group, log, sequence=sequence, width_m=500e-6) is None for group in range(len(off_m)))
+
+
+def test_a_group_that_slipped_in_the_log_of_a_capture_is_told(tmp_path, bench, film, write):
+    folder = write(tmp_path / "c", bench, film(bench))
+    before = open_capture(folder).group(2)
+    rows = [row.split(",") for row in (folder / "frames.csv").read_text("utf-8").splitlines()]
+    for row in rows[1:]:
+        row[2] = str(float(row[2]) + 1e7 * (row[0] == "2"))
+    (folder / "frames.csv").write_text("\n".join(",".join(row) for row in rows) + "\n", "utf-8")
+    capture = open_capture(folder)
+    group = capture.group(2)
+    np.testing.assert_allclose(group.arc_start_m, before.arc_start_m, atol=1e-9)
+    assert any("near to that of no group before or after it" in problem for problem in group.problems)
+    assert capture.group(1).problems == capture.group(3).problems == ()
+
+
+def test_a_place_beyond_any_groove_is_a_bad_row(log):
+    read = log(f"{HEADER}\n0,0,1.5,0\n0,1,1e300,0\n")
+    assert np.isnan(read.arc_m[0, 1])
+    assert "longer than any" in read.problems[0]

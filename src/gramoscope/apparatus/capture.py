@@ -16,7 +16,7 @@ import numpy as np
 from gramoscope.apparatus.bench import Bench
 from gramoscope.apparatus.filming import MARKER
 from gramoscope.apparatus.fingerprint import sha256_of_file, sha256_of_files
-from gramoscope.apparatus.frame_log import FrameLog, believed_places, nominal_arc_m, read_log
+from gramoscope.apparatus.frame_log import FrameLog, believed_places, nominal_arc_m, read_log, stands_alone
 from gramoscope.apparatus.manifest import MANIFEST_NAME, Manifest, read_manifest
 from gramoscope.camera.contents import Contents
 from gramoscope.camera.frames import Frame, FrameSource, Layout, Lost, Unusable, as_they_lie, develop
@@ -169,8 +169,12 @@ class Capture:
             return nominal, np.zeros_like(nominal)
         width_m = self.bench.sensor.width_px * self.bench.sensor.pixel_pitch_m
         arc_m, slipped = believed_places(self.log.arc_m[number], nominal, width_m=width_m)
+        alone = stands_alone(number, self.log, sequence=self.bench.sequence, width_m=width_m)
+        if alone is not None:
+            remarks.add("the place in the log is near to that of no group before or after it: not believed")
+            arc_m = nominal + alone
         stage_m = self.log.stage_m[number]
-        if slipped.any():
+        if alone is None and slipped.any():
             remarks.add(
                 "the place in the log lies far from where the other frames are: not believed",
                 *np.flatnonzero(slipped).tolist(),

@@ -16,6 +16,10 @@ from gramoscope.conventions import MICROMETRES_PER_METRE, BoolArray, FloatArray
 HEADER = ("group", "frame", "arc_um", "time_s")
 STAGE = "stage_um"
 _NAMED_PROBLEMS = 20
+NEIGHBOURS = 3
+"""So many groups on either side are asked whether they agree."""
+FARTHEST_M = 1e4
+"""No groove is so long."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +81,41 @@ def believed_places(arc_m: FloatArray, nominal_m: FloatArray, *, width_m: float)
     usual_m = np.sort(off_m)[(known.size - 1) // 2]
     slipped[known] = np.abs(off_m - usual_m) > width_m / 4
     return np.where(slipped, usual_m + step_m * np.arange(arc_m.size), arc_m), slipped
+
+
+def stands_alone(number: int, log: FrameLog, *, sequence: Sequence, width_m: float) -> float | None:
+    """Return where a group should be, if its logged place is near to that of no neighbour: a slip of the encoder.
+
+    A place is told from the nominal one; where a rig really jumps, groups behind the jump agree with each other.
+
+    Parameters
+    ----------
+    number : int
+        Of the group.
+    log : FrameLog
+    sequence : Sequence
+    width_m : float
+        Of a frame; places within ten of them are near.
+
+    Returns
+    -------
+    float or None
+        How far from its nominal place the group is by its neighbours (median); None if it is where it says.
+    """
+    first_m, near_m = log.arc_m[:, 0], 10 * width_m
+    for beside in (number - 1, number + 1):  # nearly always
+        if 0 <= beside < len(first_m):
+            step_m = first_m[beside] - first_m[number] - (beside - number) * sequence.group_step_m
+            if abs(step_m) <= near_m:
+                return None
+    groups = np.arange(max(number - NEIGHBOURS, 0), min(number + NEIGHBOURS + 1, len(log.arc_m)))
+    away_m = [log.arc_m[group] - nominal_arc_m(int(group), sequence=sequence) for group in groups]
+    off_m = np.array([float(np.median(one[np.isfinite(one)])) if np.isfinite(one).any() else np.nan for one in away_m])
+    mine = off_m[groups == number][0]
+    others = off_m[(groups != number) & np.isfinite(off_m)]
+    if np.isnan(mine) or others.size < 2 or np.abs(others - mine).min() <= near_m:
+        return None
+    return float(np.median(others))
 
 
 def read_log(path: Path, *, sequence: Sequence) -> FrameLog:
@@ -168,6 +207,8 @@ def _enter(row: list[str], arc_m: FloatArray, stage_m: FloatArray, *, has_stage:
         return f"there is no frame {place[1]} in a group {place[0]}"
     if not (math.isfinite(arc_um) and math.isfinite(stage_um)):
         return "a place that is not a finite number"
+    if abs(arc_um) > FARTHEST_M * MICROMETRES_PER_METRE:
+        return f"a place {arc_um:g} µm along the groove, longer than any"
     repeated = not math.isnan(arc_m[place])
     arc_m[place] = arc_um / MICROMETRES_PER_METRE
     stage_m[place] = stage_um / MICROMETRES_PER_METRE
