@@ -1,7 +1,6 @@
 """The quantile of a few numbers inside a kernel.
 
-What `np.quantile` and `np.median` do, without the eight seconds that their versions for kernels take to compile on the first
-day.
+What `np.quantile` and `np.median` do, without the seconds that their versions for kernels take to compile on the first day.
 """
 
 from __future__ import annotations

@@ -166,6 +166,13 @@ def test_a_group_that_no_neighbour_agrees_with_is_put_among_them():
     assert told[:3] + told[4:] == [None] * 7
 
 
+def test_a_group_is_believed_as_long_as_nobody_behind_it_is_known():
+    growing, sequence = _log_of([0, 0, 0, 3.0, np.nan, np.nan])
+    assert stands_alone(3, growing, sequence=sequence, width_m=500e-6) is None
+    done, sequence = _log_of([0, 0, 0, 3.0])
+    assert stands_alone(3, done, sequence=sequence, width_m=500e-6) == pytest.approx(0, abs=1e-9)
+
+
 @pytest.mark.parametrize(
     "off_m", [[0, 0, 0, 0.004, 0, 0], [0, 0, 0, 3.0, 3.0, 3.0], [0, 5.0], [7.0], [0, 0, 3.0, 3.0, 0, 0]]
 )

@@ -86,7 +86,8 @@ def believed_places(arc_m: FloatArray, nominal_m: FloatArray, *, width_m: float)
 def stands_alone(number: int, log: FrameLog, *, sequence: Sequence, width_m: float) -> float | None:
     """Return where a group should be, if its logged place is near to that of no neighbour: a slip of the encoder.
 
-    A place is told from the nominal one; where a rig really jumps, groups behind the jump agree with each other.
+    A place is told from the nominal one; where a rig really jumps, groups behind the jump agree with each other. While nobody
+    behind a group is known (a film that is still being made) it is believed.
 
     Parameters
     ----------
@@ -113,7 +114,8 @@ def stands_alone(number: int, log: FrameLog, *, sequence: Sequence, width_m: flo
     off_m = np.array([float(np.median(one[np.isfinite(one)])) if np.isfinite(one).any() else np.nan for one in away_m])
     mine = off_m[groups == number][0]
     others = off_m[(groups != number) & np.isfinite(off_m)]
-    if np.isnan(mine) or others.size < 2 or np.abs(others - mine).min() <= near_m:
+    nobody_behind_yet = number + 1 < len(log.arc_m) and not np.isfinite(off_m[groups > number]).any()
+    if np.isnan(mine) or nobody_behind_yet or others.size < 2 or np.abs(others - mine).min() <= near_m:
         return None
     return float(np.median(others))
 
