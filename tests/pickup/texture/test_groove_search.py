@@ -5,6 +5,7 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from gramoscope.camera.film_line import film_line
 from gramoscope.conventions import INNER, OUTER, FloatArray
@@ -12,7 +13,7 @@ from gramoscope.disc.formats import Cut
 from gramoscope.errors import ArgumentError
 from gramoscope.pickup.texture.groove_search import GrooveSearch, best_path
 from gramoscope.pickup.texture.layout import StripeLayout
-from gramoscope.pickup.texture.sharpness import CELL_PX, cell_energy, ridges, sharpness, whole_pixels
+from gramoscope.pickup.texture.sharpness import CELL_PX, cell_energy, ridges, sharpness, sharpness_of, whole_pixels
 from gramoscope.simulation.scene import filming_bench
 
 CELLS, HEIGHT = 160, 640
@@ -121,6 +122,22 @@ def test_a_scratch_leads_nobody_astray() -> None:
         sharp[cells, np.clip(60 + 3 * cells + width, 0, HEIGHT - 1)] = 1.5
     found, _ = _found(sharp, "lateral")
     assert np.quantile(np.abs(found - QUIET), 0.95) < EXACT_REACH_PX
+
+
+@pytest.mark.parametrize("left", [0.2, 0.5])
+def test_what_a_chip_has_left_of_the_stripes_is_found(left: float) -> None:
+    rng = np.random.default_rng(2)
+    camera_noise = rng.chisquare(8, (CELLS, HEIGHT)) / 8
+    chipped = np.arange(CELLS) >= left * CELLS
+    stripes = _painted(_both(QUIET))
+    # a little out of focus, on either side of a stripe, its wall is fainter, and still far above the noise
+    energy = 180**2 * (stripes + 0.5 * ndimage.gaussian_filter1d(stripes, 12, axis=1)) ** 2
+    energy = np.where(chipped[:, None], 0, energy) + 30 * camera_noise
+    sharp = sharpness_of(energy.astype(np.float32))
+    found, support = _found(sharp, "lateral")
+    error = np.abs(found - QUIET)[:, ~chipped]
+    assert np.quantile(error, 0.95) < EXACT_REACH_PX
+    assert np.median(support[:, ~chipped]) > 5 * np.median(support[:, chipped])
 
 
 def test_a_vertical_groove_moves_its_walls_against_each_other() -> None:

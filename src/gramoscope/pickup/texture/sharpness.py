@@ -132,6 +132,8 @@ def sharpness_of(energy: Float32Array, *, ceiling: float = CEILING) -> Float32Ar
 
 QUIETEST = 0.1
 """A tenth of the rows are quieter than where nothing is sharp."""
+LEAST_WHOLE = 0.15
+"""Of the cells, that must show stripes; those of a whole stretch differ by less than 2 in how bright they are."""
 EVERY = 8
 """Of so many cells one is looked at to find out how quiet the quietest rows are."""
 
@@ -168,13 +170,17 @@ def _limit(cell, gain, ceiling):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _relate(sharp, usual, ceiling):  # type: ignore[no-untyped-def]
-    """Turn energies into amplitudes above the noise (what quiet rows usually have), a typical cell's largest being 1."""
+    """Turn energies into amplitudes above the noise (what quiet rows usually have), a typical cell's largest being 1.
+
+    Where most of a stretch is chipped off, its typical cell shows nothing, and what is left of the stripes would be too
+    bright to stand out; so the brightest cells have a word.
+    """
     noise = np.float32(quantile(usual, QUIETEST))
     peak = np.empty(len(sharp), np.float32)
     for cell in range(len(sharp)):
         _root_above(sharp[cell], noise)
         peak[cell] = sharp[cell].max()
-    reference = quantile(peak, 0.5)
+    reference = max(quantile(peak, 0.5), 0.5 * quantile(peak, 1 - LEAST_WHOLE))
     gain = np.float32(1 / reference) if reference > 0 else np.float32(0)
     for cell in range(len(sharp)):
         _limit(sharp[cell], gain, ceiling)
