@@ -9,9 +9,17 @@ import pytest
 
 from gramoscope.apparatus.bench import Bench, Sequence
 from gramoscope.errors import ArgumentError
+from gramoscope.pickup.overlay import TILE_COLUMNS, TILE_ROWS
+from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.reading import Evidence
 from gramoscope.pickup.texture.stretch import Stretch
-from gramoscope.pickup.texture_likelihood import STRIDE_PX, TextureLikelihood, samples_of, worth_reading
+from gramoscope.pickup.texture_likelihood import (
+    STRIDE_PX,
+    TextureLikelihood,
+    samples_of,
+    tiles_to_draw,
+    worth_reading,
+)
 from gramoscope.quality import Quality
 from gramoscope.signal_path import FrameGroup
 from gramoscope.simulation.scene import filming_bench
@@ -73,6 +81,25 @@ def test_a_stretch_that_surprises_has_wider_error_bars(surprise: float, factor: 
     _, wider = samples_of(stretch, replace(usual, surprise=np.array([1.0, surprise])))
     np.testing.assert_array_equal(wider[0], sigma[0])
     np.testing.assert_allclose(wider[1], factor * sigma[1])
+
+
+def test_ends_that_cannot_be_read_are_drawn_all_the_same() -> None:
+    bench = filming_bench(height_px=640)
+    layout, ends = StripeLayout.of_bench(bench, edge_margin_px=-16.0), (slice(0, 130), slice(1150, 1280))
+
+    def drawn(vertical_px: float) -> np.ndarray:
+        # so far aside that no shallow stripe is in sight
+        moved = np.array([-vertical_px, vertical_px]) - 60.0
+        rows = layout.rows(np.repeat(moved[:, None], 1280, axis=1))
+        return tiles_to_draw(rows, layout, (640, 1280), ends, half_px=12)
+
+    at_rest, at_the_bottom = drawn(0.0), drawn(layout.from_bottom_px.min() - 6.0)
+    middle, end = slice(256 // TILE_COLUMNS, 1024 // TILE_COLUMNS), slice(0, 128 // TILE_COLUMNS)
+    assert at_rest[:, middle].any()
+    bottom = round(layout.middle_row - 60) // TILE_ROWS
+    deep = slice(bottom - 1, bottom + 2)
+    assert not at_the_bottom[deep, middle].any()
+    assert at_the_bottom[deep, end].all()
 
 
 @pytest.mark.parametrize(

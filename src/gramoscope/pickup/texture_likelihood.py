@@ -308,15 +308,10 @@ class TexturePickup:
         support = _by_column(coarse[1], x, cell, smooth_cells=SUPPORT_CELLS)
         walls = np.array([support[self.layout.wall == wall].max(axis=0, initial=0.0) for wall in (INNER, OUTER)])
         path = settled(path, walls, self.cartridge.bench.disc.cut, self.cartridge.rules)
-        half_px = self.cartridge.learning.half_px
         rows = np.full((self.layout.wall.size, width), np.nan)
         rows[:, read] = self.layout.rows(path)
-        rows[:, read][~self.layout.visible(rows[:, read], half_px=half_px - WANDER_PX)] = np.nan
-        reach_px = wide_rows(half_px) / 2 + TAPS / 2 + WANDER_PX
-        wanted = tiles_about(rows, (height, width), reach_px=reach_px)
-        for end in strip_columns(group, width=width, group_step_m=self.cartridge.bench.sequence.group_step_m):
-            tiles = slice(end.start // TILE_COLUMNS, -(-end.stop // TILE_COLUMNS))
-            wanted[:, tiles] = wanted[:, tiles].any(axis=1, keepdims=True)
+        ends = strip_columns(group, width=width, group_step_m=self.cartridge.bench.sequence.group_step_m)
+        wanted = tiles_to_draw(rows, self.layout, (height, width), ends, half_px=self.cartridge.learning.half_px)
         laid = device.overlay(film, shift_px, np.flatnonzero(group.valid), wanted)
         columns = laid.columns[read]
         burnt = device.places_brighter(columns, NEARLY_WHITE * group.white_level)
@@ -374,6 +369,36 @@ def worth_reading(usable: BoolArray, most: int) -> slice:
     inside = np.flatnonzero(usable)
     first = max(int(inside[0]) - BESIDE_PX, 0) // STRIDE_PX * STRIDE_PX
     return slice(first, min(int(inside[-1]) + 1 + BESIDE_PX, usable.size, first + most))
+
+
+def tiles_to_draw(
+    rows: FloatArray, layout: StripeLayout, shape: tuple[int, int], ends: tuple[slice, ...], *, half_px: int
+) -> BoolArray:
+    """Return which tiles of a picture are looked at: those about stripes that can be read, and at its ends what can be matched.
+
+    Parameters
+    ----------
+    rows : float64 array, shape (stripe, column)
+        Where the stripes run; NaN in columns that are not read.
+    layout : StripeLayout
+    shape : (int, int)
+        Rows and columns of the picture.
+    ends : tuple of slice
+        Columns that are matched with the neighbours: there a texture will do that cannot be read, as where stripes meet at
+        the bottom of the groove.
+    half_px : int
+        Of the windows.
+    """
+    shown = layout.visible(rows, half_px=half_px - WANDER_PX)
+    seen = (rows >= layout.first_row[:, None]) & (rows <= layout.last_row[:, None])
+    for end in ends:
+        if shown[:, end].any(axis=0).mean() < 0.5:
+            shown[:, end] = seen[:, end]
+    wanted = tiles_about(np.where(shown, rows, np.nan), shape, reach_px=wide_rows(half_px) / 2 + TAPS / 2 + WANDER_PX)
+    for end in ends:
+        tiles = slice(end.start // TILE_COLUMNS, -(-end.stop // TILE_COLUMNS))
+        wanted[:, tiles] = wanted[:, tiles].any(axis=1, keepdims=True)
+    return wanted
 
 
 def _by_column(cells: FloatArray, x: IntArray, cell: FloatArray, *, smooth_cells: float) -> FloatArray:

@@ -158,6 +158,24 @@ def test_the_motion_of_a_single_stripe_is_taken_for_one_in_the_direction_of_the_
     assert np.quantile(error[OUTER], 0.95) < EXACT_REACH_PX
 
 
+def test_where_both_deep_stripes_meet_at_the_bottom_neither_is_taken_for_the_other() -> None:
+    outer = _wave(3, 90)
+    inner = outer - 67 + 26 * (np.arange(CELLS) / CELLS - 0.6) ** 2 / 0.36
+    displacement = np.array([inner, outer])
+    one, other = LAYOUT.rows(displacement)[1:3]
+    deep = LAYOUT.from_bottom_px[1:3].mean() - (outer - inner) / 2
+    assert deep.min() < 12 < 16 < deep.max()
+    # each as sharp as ever while they are two, and all between them is sharp where they have met
+    sharp = _painted(displacement, stripes=replace(LAYOUT, first_row=np.array([HEIGHT, 0, 0, HEIGHT])))
+    away = np.abs(np.arange(HEIGHT) - (one + other)[:, None] / 2)
+    band = np.random.default_rng(4).uniform(0.4, 1.4, (CELLS, 1)) * np.exp(-0.5 * (away / deep[:, None]) ** 2)
+    sharp[deep < 16] = np.maximum(0.05, band)[deep < 16]
+    found, _ = _found(sharp, "stereo")
+    error = np.abs(found - displacement)
+    assert np.quantile(error[:, deep > 20], 0.95) < EXACT_REACH_PX
+    assert error[:, deep <= 16].max() < 3 * EXACT_REACH_PX
+
+
 def _only(number: int) -> FloatArray:
     """First rows of a layout in which no other stripe can be seen."""
     return np.where(np.arange(LAYOUT.wall.size) == number, LAYOUT.first_row, HEIGHT)

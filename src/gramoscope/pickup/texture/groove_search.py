@@ -128,14 +128,14 @@ def _add_above(values, first, level, begin, count, sums):  # type: ignore[no-unt
 
 
 @numba.njit(cache=True, nogil=True)
-def _common_path(coarse, swing, first_row, seen_rows, absent, largest_step, step_cost):  # type: ignore[no-untyped-def]
+def _common_path(coarse, swing, looks, first_row, seen_rows, absent, largest_step, step_cost):  # type: ignore[no-untyped-def]
     """Return the best path through the sums of all stripes, cell by cell.
 
-    coarse[row % GRID_PX, cell, row // GRID_PX] holds every third row, so that neighbouring displacements lie side by side;
-    swing[v, k] is what displacements cost; stripe i of a groove with vertical displacement v and the first lateral one lies in
-    row first_row[i, v], and is seen in rows from seen_rows[i, v, 0] to seen_rows[i, v, 1].
+    coarse[look, row % GRID_PX, cell, row // GRID_PX] holds every third row, so that neighbouring displacements lie side by
+    side; swing[v, k] is what displacements cost; stripe i of a groove with vertical displacement v and the first lateral one
+    lies in row first_row[i, v], is seen in rows from seen_rows[i, v, 0] to seen_rows[i, v, 1], and looks like looks[i, v].
     """
-    _, cells, thirds = coarse.shape
+    _, _, cells, thirds = coarse.shape
     verticals, laterals = swing.shape
     shape = (cells, verticals, laterals)
     line, sums, along, new = _room(shape, largest_step, coarse.dtype)
@@ -152,7 +152,7 @@ def _common_path(coarse, swing, first_row, seen_rows, absent, largest_step, step
                 count = min(laterals, (high - first_row[i, v]) // GRID_PX + 1) - start
                 row = first_row[i, v] + GRID_PX * start
                 if count > 0:
-                    there = ((row % GRID_PX) * cells + cell) * thirds + row // GRID_PX
+                    there = ((looks[i, v] * GRID_PX + row % GRID_PX) * cells + cell) * thirds + row // GRID_PX
                     _add_above(ridges_, there, absent, begin + v * line + start, count, sums)
         if cell > 0:
             _go_on(sums, begin - size, line, size, largest_step, step_cost, along, new)
@@ -238,11 +238,13 @@ class GrooveSearch:
             Sharpness of the ridge found for each stripe; 0 where it cannot be seen.
         """
         ridge = ridges(sharp)
-        lateral, vertical = self._common(ridge, layout, cut)
+        lateral, vertical = self._common(sharp, ridge, layout, cut)
         common = np.array([lateral - vertical, lateral + vertical])
         return self._own_paths(ridge, layout, common)
 
-    def _common(self, ridge: Float32Array, layout: StripeLayout, cut: Cut) -> tuple[FloatArray, FloatArray]:
+    def _common(
+        self, sharp: Float32Array, ridge: Float32Array, layout: StripeLayout, cut: Cut
+    ) -> tuple[FloatArray, FloatArray]:
         """Return the lateral and the vertical displacement that suit all stripes, on a grid of `GRID_PX`."""
         height = ridge.shape[1]
         reach = {
@@ -254,15 +256,23 @@ class GrooveSearch:
         low, high = (layout.first_row - layout.rest_row).min(), (layout.last_row - layout.rest_row).max()
         lateral = _grid(max(low - reach[1], -reach[0]), min(high + reach[1], reach[0]))
         vertical = _grid(-reach[1], reach[1])
-        coarse = np.zeros((GRID_PX, len(ridge), -(-height // GRID_PX)), np.float32)
-        _thin_out(ridge, coarse)
         used = [cut != "vertical", cut != "lateral"]
         large = [self.usual_swing_px if use else self.usual_drift_px for use in used]
         swing = self.swing_cost * ((lateral / large[0]) ** 2 + (vertical[:, None] / large[1]) ** 2)
-        first_row = np.rint(layout.rest_row).astype(np.int64)[:, None] + lateral[0]
-        first_row = first_row + wall_sign(layout.wall).astype(np.int64)[:, None] * vertical
         depth = layout.from_bottom_px[:, None] - vertical
-        on_wall = (depth > BOTTOM_PX) & (depth < layout.half_width_px)
+        merged = (depth >= 0) & (depth < MERGED_PX)
+        rest = (
+            np.rint(layout.rest_row).astype(np.int64)[:, None]
+            + wall_sign(layout.wall).astype(np.int64)[:, None] * vertical
+        )
+        first_row = np.where(merged, int(np.rint(layout.middle_row)), rest) + lateral[0]
+        half = np.where(merged, np.maximum(GRID_PX * np.rint(depth / GRID_PX), 2 * GRID_PX), 0).astype(np.int64)
+        halves, looks = np.unique(half, return_inverse=True)
+        coarse = np.zeros((halves.size, GRID_PX, len(ridge), -(-height // GRID_PX)), np.float32)
+        for look, one in enumerate(halves):
+            flanks = (int(one) + FLANK_PX[0], int(one) + FLANK_PX[1])
+            _thin_out(ridges(sharp, half_px=int(one), flank_px=flanks) if one else ridge, coarse[look])
+        on_wall = (merged | (depth > BOTTOM_PX)) & (depth < layout.half_width_px)
         rows = np.array([np.maximum(np.ceil(layout.first_row), 0), np.minimum(np.floor(layout.last_row), height - 1)])
         seen = np.where(on_wall[:, :, None], rows.T[:, None], [0, -1]).astype(np.int64)
         steps = np.array([1 if use else int(len(ridge) > 1) for use in used])
@@ -270,16 +280,19 @@ class GrooveSearch:
         costs = np.array([self.step_cost * GRID_PX if use else 1.0 for use in used])
         absent = np.float32(self.absent)
         steps, costs = steps[::-1].copy(), costs[::-1].copy()
-        path, _ = _common_path(coarse, swing.astype(np.float32), first_row, seen, absent, steps, costs)
+        looks = looks.reshape(half.shape)
+        path, _ = _common_path(coarse, swing.astype(np.float32), looks, first_row, seen, absent, steps, costs)
         return lateral[path[1]].astype(np.float64), vertical[path[0]].astype(np.float64)
 
     def _own_paths(
         self, ridge: Float32Array, layout: StripeLayout, common: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Let each wall look for its stripes, row by row, near the common path."""
+        """Let each wall look for its stripes, row by row, near the common path; merged stripes lead nobody."""
         path, support = common.copy(), np.zeros((layout.wall.size, len(ridge)))
+        depth = layout.from_bottom_px[:, None] - 0.5 * (common[OUTER] - common[INNER])
+        alone = (depth < 0) | (depth >= MERGED_PX)
         limits = np.array([layout.first_row, layout.last_row])
-        _own(ridge, layout.rest_row, layout.wall, limits, int(self.wall_reach_px), self.step_cost, path, support)
+        _own(ridge, layout.rest_row, layout.wall, limits, alone, int(self.wall_reach_px), self.step_cost, path, support)
         return path, support
 
 
@@ -292,7 +305,7 @@ def _ridge_at(ridge, cell, place, limits):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _own(ridge, rest_row, wall, limits, reach, step_cost, path, support):  # type: ignore[no-untyped-def]
+def _own(ridge, rest_row, wall, limits, alone, reach, step_cost, path, support):  # type: ignore[no-untyped-def]
     """Move the path of each wall to where its stripes are, and write how sharp they are there."""
     steps, costs = np.array([0, 3]), np.array([0.0, step_cost])
     score = np.empty((len(ridge), 1, 2 * reach + 1), ridge.dtype)
@@ -302,7 +315,7 @@ def _own(ridge, rest_row, wall, limits, reach, step_cost, path, support):  # typ
                 aside = k - reach
                 score[cell, 0, k] = -PULL * step_cost * aside * aside
                 for i in range(wall.size):
-                    if wall[i] == w:
+                    if wall[i] == w and alone[i, cell]:
                         score[cell, 0, k] += _ridge_at(ridge, cell, rest_row[i] + path[w, cell] + aside, limits[:, i])
         path[w] += best_path(score, steps, costs)[0][1] - reach
         for i in range(wall.size):
@@ -315,5 +328,9 @@ def _own(ridge, rest_row, wall, limits, reach, step_cost, path, support):  # typ
 
 PULL = 0.3
 """A wall is held to the common path by so much of what steps from cell to cell cost."""
+MERGED_PX = 16.0
+"""Nearer to the middle of the groove than this, both stripes of a sharp plane are one: all between them is sharp."""
+FLANK_PX = (5, 13)
+"""Beside what is sharp, as far as `ridges` looks beside a stripe."""
 GRID_PX = 3
 """Step of the common search; with ridges seven rows wide nothing is missed, and one step a cell is a slope of 0.37."""
