@@ -100,7 +100,7 @@ def test_the_pickup_sees_the_same_in_frames_that_lie_apart() -> None:
     shift_px = frame_shifts(together)[0]
     np.testing.assert_allclose(shift_px, 3.0 * np.arange(4), atol=0.2)
     np.testing.assert_array_equal(frame_shifts(apart)[0], shift_px)
-    np.testing.assert_array_equal(sharpness(apart.images, shift_px), sharpness(images, shift_px))
+    np.testing.assert_array_equal(sharpness(apart.images, shift_px).relative, sharpness(images, shift_px).relative)
     np.testing.assert_array_equal(
         overlay(apart.images, shift_px, np.arange(4)).columns, overlay(images, shift_px, np.arange(4)).columns
     )

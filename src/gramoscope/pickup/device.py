@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from gramoscope.pickup.overlay import Overlay
     from gramoscope.pickup.texture.hearing import Ear
+    from gramoscope.pickup.texture.sharpness import Sharpness
     from gramoscope.pickup.texture.tone import Tone
 
 Kept = Any
@@ -61,8 +62,8 @@ class Device(Protocol):
         """Return how far the record turned by each frame, and from frame to frame; see `registration.frame_shifts`."""
         ...
 
-    def sharpness(self, film: Film, shift_px: FloatArray) -> Float32Array:
-        """Return where the picture is sharp, shape (cell, row); see `texture.sharpness`."""
+    def sharpness(self, film: Film, shift_px: FloatArray) -> Sharpness:
+        """Return where the picture is sharp; see `texture.sharpness`."""
         ...
 
     def overlay(

@@ -12,7 +12,7 @@ from gramoscope.pickup.device import Film
 from gramoscope.pickup.overlay import Overlay, overlay, places_brighter
 from gramoscope.pickup.registration import frame_shifts
 from gramoscope.pickup.texture.hearing import Ear, heard
-from gramoscope.pickup.texture.sharpness import sharpness
+from gramoscope.pickup.texture.sharpness import Sharpness, sharpness
 from gramoscope.pickup.texture.tone import Tone
 from gramoscope.signal_path import FrameGroup
 
@@ -34,7 +34,7 @@ class Processor:
         """See `registration.frame_shifts`."""
         return frame_shifts(film.group)
 
-    def sharpness(self, film: Film, shift_px: FloatArray) -> Float32Array:
+    def sharpness(self, film: Film, shift_px: FloatArray) -> Sharpness:
         """See `texture.sharpness`."""
         return sharpness(film.images, shift_px)
 

@@ -17,7 +17,7 @@ from scipy import ndimage
 
 from gramoscope.apparatus.bench import Bench
 from gramoscope.camera.exposure import Exposure
-from gramoscope.conventions import INNER, OUTER, BoolArray, Float32Array, FloatArray, IntArray
+from gramoscope.conventions import INNER, OUTER, BoolArray, FloatArray, IntArray
 from gramoscope.errors import require
 from gramoscope.pickup.cartridge import Line, Sketch, Spread
 from gramoscope.pickup.device import Device, Film
@@ -38,7 +38,7 @@ from gramoscope.pickup.texture.groove_search import GrooveSearch
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.learning import Learning, Lesson
 from gramoscope.pickup.texture.reading import Evidence, Model, Rules, read, settled, spaced
-from gramoscope.pickup.texture.sharpness import CELL_PX
+from gramoscope.pickup.texture.sharpness import CELL_PX, Sharpness
 from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.quality import Quality, no_flags
 from gramoscope.signal_path import FrameGroup, Texture, WallTrace
@@ -127,10 +127,11 @@ class TextureLikelihood:
         unread = TexturePickup(self, nominal)
         if not seen:
             return unread
+        usual = float(np.median([sight.sharp.typical for sight in seen]))
         layout, paths = aligned_layout(
-            [sight.sharp for sight in seen], nominal, self.search, self.bench.disc.cut, spread
+            [sight.sharp.among(usual) for sight in seen], nominal, self.search, self.bench.disc.cut, spread
         )
-        pickup = replace(unread, layout=layout)
+        pickup = replace(unread, layout=layout, usual_sharpness=usual)
 
         def prepared(i: int) -> Stretch:
             usable, _ = self.exposure.sort_out(group(seen[i].number))
@@ -162,14 +163,14 @@ class Sight:
     shift_px : float64 array, shape (valid frame,)
     step_m : float64 array, shape (frame − 1,)
         How far the record turned, see `registration.frame_shifts`.
-    sharp : float32 array, shape (cell, row)
+    sharp : Sharpness
         Where its picture is sharp.
     """
 
     number: int
     shift_px: FloatArray
     step_m: FloatArray
-    sharp: Float32Array
+    sharp: Sharpness
 
 
 def sight_of(film: Film) -> Sight:
@@ -187,6 +188,8 @@ class TexturePickup:
     cartridge : TextureLikelihood
     layout : StripeLayout
         Where the passage has its stripes.
+    usual_sharpness : float
+        How sharp they are there, see `Sharpness.typical`; 0 before anything was learned.
     lessons : tuple of Lesson
         What it taught; empty when there was nothing to learn from.
     fold : mapping
@@ -195,6 +198,7 @@ class TexturePickup:
 
     cartridge: TextureLikelihood
     layout: StripeLayout
+    usual_sharpness: float = 0.0
     lessons: tuple[Lesson, ...] = ()
     fold: Mapping[int, int] = field(default_factory=dict)
 
@@ -235,7 +239,8 @@ class TexturePickup:
 
     def searched(self, sight: Sight) -> Coarse:
         """Return where the coarse search finds both walls, and how sharp each stripe; see `GrooveSearch.find`."""
-        return self.cartridge.search.find(sight.sharp, self.layout, cut=self.cartridge.bench.disc.cut)
+        sharp = sight.sharp.among(self.usual_sharpness)
+        return self.cartridge.search.find(sharp, self.layout, cut=self.cartridge.bench.disc.cut)
 
     def strips(self, laid: Overlay, film: Film) -> tuple[Texture | None, Texture | None]:
         """Return the texture at both ends of a group's mean, by which it is matched with its neighbours."""

@@ -20,11 +20,13 @@ class TextureLessons:
     Attributes
     ----------
     layout : StripeLayout
+    usual_sharpness : float
     lessons : tuple of Lesson
     fold : mapping
     """
 
     layout: StripeLayout
+    usual_sharpness: float
     lessons: tuple[Lesson, ...]
     fold: Mapping[int, int]
 
@@ -49,14 +51,14 @@ def learned_of(pickup: Pickup, files: tuple[FileSeen, ...]) -> Learned:
     """Return what a pickup has learned, from these files."""
     if not isinstance(pickup, TexturePickup):
         return Learned(None, files)
-    return Learned(TextureLessons(pickup.layout, pickup.lessons, pickup.fold), files)
+    return Learned(TextureLessons(pickup.layout, pickup.usual_sharpness, pickup.lessons, pickup.fold), files)
 
 
 def pickup_of(cartridge: Cartridge, learned: Learned) -> Pickup:
     """Return the pickup that a cartridge became by learning."""
     if isinstance(cartridge, TextureLikelihood) and learned.texture is not None:
         known = learned.texture
-        return TexturePickup(cartridge, known.layout, known.lessons, known.fold)
+        return TexturePickup(cartridge, known.layout, known.usual_sharpness, known.lessons, known.fold)
     # one that learns nothing is its own pickup, whatever it is given to learn from
     return cartridge.learn(_nothing, 0, map)
 

@@ -43,7 +43,7 @@ def _picture(number: int, true: StripeLayout) -> np.ndarray:
 
 
 def _sharp(pictures: list[np.ndarray]) -> list[np.ndarray]:
-    return [sharpness(np.ascontiguousarray(picture)[np.newaxis], np.zeros(1)) for picture in pictures]
+    return [sharpness(np.ascontiguousarray(picture)[np.newaxis], np.zeros(1)).relative for picture in pictures]
 
 
 def _aligned(nominal: StripeLayout, true: StripeLayout) -> tuple[StripeLayout, list[tuple[FloatArray, FloatArray]]]:

@@ -133,7 +133,7 @@ def test_what_a_chip_has_left_of_the_stripes_is_found(left: float) -> None:
     # a little out of focus, on either side of a stripe, its wall is fainter, and still far above the noise
     energy = 180**2 * (stripes + 0.5 * ndimage.gaussian_filter1d(stripes, 12, axis=1)) ** 2
     energy = np.where(chipped[:, None], 0, energy) + 30 * camera_noise
-    sharp = sharpness_of(energy.astype(np.float32))
+    sharp = sharpness_of(energy.astype(np.float32)).relative
     found, support = _found(sharp, "lateral")
     error = np.abs(found - QUIET)[:, ~chipped]
     assert np.quantile(error, 0.95) < EXACT_REACH_PX
@@ -217,7 +217,7 @@ STILL = np.zeros(1)
 
 
 def test_the_picture_is_sharp_where_its_texture_is_and_shading_is_none() -> None:
-    sharp = sharpness(_texture(83.0), STILL)
+    sharp = sharpness(_texture(83.0), STILL).relative
     assert sharp.shape == (640 // CELL_PX, 200)
     mean = sharp.mean(axis=0)
     assert abs(int(np.argmax(mean)) - 83) <= 2
@@ -227,13 +227,20 @@ def test_the_picture_is_sharp_where_its_texture_is_and_shading_is_none() -> None
 
 
 def test_sharpness_does_not_depend_on_brightness_and_contrast() -> None:
-    np.testing.assert_allclose(
-        sharpness(_texture(83.0, gain=7.0, offset=300.0), STILL), sharpness(_texture(83.0), STILL), atol=3e-2
-    )
+    one, other = sharpness(_texture(83.0, gain=7.0, offset=300.0), STILL), sharpness(_texture(83.0), STILL)
+    np.testing.assert_allclose(one.relative, other.relative, atol=3e-2)
+    assert one.typical == pytest.approx(7 * other.typical, rel=0.02)
+
+
+@pytest.mark.parametrize(("usual", "share"), [(0.0, 1), (1.0, 1), (4.0, 1), (8.0, 0.5), (400.0, 0.01)])
+def test_a_picture_of_nothing_but_noise_is_not_sharp_among_others(usual: float, share: float) -> None:
+    """Its own noise is as large as its own noise."""
+    found = sharpness(_texture(83.0), STILL)
+    np.testing.assert_allclose(found.among(usual * found.typical), share * found.relative, rtol=1e-6)
 
 
 def test_a_picture_without_texture_is_nowhere_sharp() -> None:
-    assert (sharpness(np.full((3, 50, 64), 90, np.uint8), np.array([0.0, 2.0, 4.0])) == 0).all()
+    assert (sharpness(np.full((3, 50, 64), 90, np.uint8), np.array([0.0, 2.0, 4.0])).relative == 0).all()
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
@@ -254,7 +261,7 @@ def test_the_energy_of_a_cell_is_that_of_the_frames_laid_over_each_other(dtype: 
     cell_energy(*film_line(images), 70, np.arange(3), np.array([0, 3, 7]), share, total_room, energy)
     np.testing.assert_allclose(energy, expected, rtol=1e-4)
     # uneven shifts count to whole pixels, and the last frame ends where the picture does
-    assert sharpness(images, shift).shape == (9, 4)
+    assert sharpness(images, shift).relative.shape == (9, 4)
 
 
 @pytest.mark.parametrize(("frames", "seen"), [(1, [0]), (4, [0, 1, 2, 3]), (12, [0, 4, 7, 11])])

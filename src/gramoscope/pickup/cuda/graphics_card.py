@@ -33,7 +33,7 @@ from gramoscope.pickup.registration import (
 from gramoscope.pickup.texture.following import REACH, places_of
 from gramoscope.pickup.texture.hearing import Ear
 from gramoscope.pickup.texture.likelihood import TEMPER, TEXTURE_PX
-from gramoscope.pickup.texture.sharpness import CELL_PX, sharpness_of, whole_pixels
+from gramoscope.pickup.texture.sharpness import CELL_PX, Sharpness, sharpness_of, whole_pixels
 from gramoscope.pickup.texture.tone import Tone
 from gramoscope.signal_path import FrameGroup
 
@@ -68,7 +68,7 @@ class GraphicsCard:
             found_px = there.copy_to_host()
         return added_up(film.group, expected_px, found_px)
 
-    def sharpness(self, film: Film, shift_px: FloatArray) -> Float32Array:
+    def sharpness(self, film: Film, shift_px: FloatArray) -> Sharpness:
         """See `texture.sharpness`; energies come back, and what follows is small."""
         _, height, width = film.images.shape
         frames, offset, share = whole_pixels(width, shift_px)

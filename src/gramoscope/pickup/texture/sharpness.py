@@ -8,6 +8,8 @@ any stripe, so the root is cut off.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numba
 import numpy as np
 
@@ -85,7 +87,32 @@ def cell_energy(film, step, width, frames, offset, share, total, energy):  # typ
                 energy[cell, first + j] = part[j, cell]
 
 
-def sharpness(images: ImageArray, shift_px: FloatArray, *, ceiling: float = CEILING) -> Float32Array:
+FAINTEST = 0.25
+"""A stretch whose stripes are so many times as sharp as is usual in its passage shows stripes yet."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sharpness:
+    """How sharp the picture of a group is.
+
+    Attributes
+    ----------
+    relative : float32 array, shape (cell, row)
+        Root of the energy above the noise, a little smoothed, in units of `typical`.
+    typical : float
+        That of the sharpest row of a typical cell, in grey levels.
+    """
+
+    relative: Float32Array
+    typical: float
+
+    def among(self, usual: float) -> Float32Array:
+        """Return `relative`, and less of it where nothing is seen but noise: of a passage whose stretches have this usually."""
+        least = FAINTEST * usual
+        return self.relative if self.typical >= least else self.relative * np.float32(self.typical / least)
+
+
+def sharpness(images: ImageArray, shift_px: FloatArray, *, ceiling: float = CEILING) -> Sharpness:
     """Return how sharp the picture of a group is, cell by cell.
 
     Parameters
@@ -98,8 +125,7 @@ def sharpness(images: ImageArray, shift_px: FloatArray, *, ceiling: float = CEIL
 
     Returns
     -------
-    float32 array, shape (cell, row)
-        Root of the energy above the noise, a little smoothed, in units of the sharpest row of a typical cell.
+    Sharpness
     """
     frames, offset, share = whole_pixels(images.shape[2], shift_px)
     width = share.size
@@ -120,14 +146,14 @@ def whole_pixels(frame_width: int, shift_px: FloatArray) -> tuple[IntArray, IntA
     return frames, offset, (1 / np.maximum(counts, 1)).astype(np.float32)
 
 
-def sharpness_of(energy: Float32Array, *, ceiling: float = CEILING) -> Float32Array:
+def sharpness_of(energy: Float32Array, *, ceiling: float = CEILING) -> Sharpness:
     """Return how sharp cells of such energies are, see `sharpness`."""
     sharp = np.empty_like(energy)
     _smooth(energy, sharp)
     # a row is quiet all along the stretch, or it is not
     some = np.sort(sharp[::EVERY], axis=0)
-    _relate(sharp, 0.5 * (some[(len(some) - 1) // 2] + some[len(some) // 2]), np.float32(ceiling))
-    return sharp
+    typical = _relate(sharp, 0.5 * (some[(len(some) - 1) // 2] + some[len(some) // 2]), np.float32(ceiling))
+    return Sharpness(sharp, float(typical))
 
 
 QUIETEST = 0.1
@@ -184,6 +210,7 @@ def _relate(sharp, usual, ceiling):  # type: ignore[no-untyped-def]
     gain = np.float32(1 / reference) if reference > 0 else np.float32(0)
     for cell in range(len(sharp)):
         _limit(sharp[cell], gain, ceiling)
+    return reference
 
 
 @numba.njit(cache=True, nogil=True)
