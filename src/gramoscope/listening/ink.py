@@ -11,10 +11,12 @@ from io import BytesIO
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.ticker import NullFormatter
 
 from gramoscope.conventions import FloatArray
 from gramoscope.listening.whole_file import written_whole
@@ -36,6 +38,8 @@ SMALL = 8.5
 MEDIUM = 10.0
 LARGE = 13.0
 LEGEND_LINE = 1.55 * SMALL
+PNG_LEVEL = 3
+"""A picture of a film hardly gets smaller by more."""
 
 
 def blank_figure(width_in: float, height_in: float) -> Figure:
@@ -89,24 +93,54 @@ def legend_above(axes: Axes, *, columns: int, side: Literal["left", "right"] = "
     )
 
 
+def whole_decades(axes: Axes) -> None:
+    """Let the upright axis, a logarithmic one, run from a power of ten to another, and name those alone."""
+    low, high = axes.get_ylim()
+    if low <= 0:  # nothing was drawn that such an axis could show
+        low, high = NOTHING
+    axes.set_ylim(10 ** np.floor(np.log10(low)), 10 ** np.ceil(np.log10(high)))
+    axes.yaxis.set_major_formatter(lambda value, _: power_of_ten(round(np.log10(value))))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+
+
+NOTHING = (1e-3, 1.0)
+"""The upright axis of what has no positive values."""
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def power_of_ten(exponent: int) -> str:
+    """Return 10 with a raised exponent, as letters: matplotlib's own formulas take longer than all the rest of a picture."""
+    return "10" + str(exponent).translate(_RAISED)
+
+
 def readable_time(time_s: FloatArray) -> tuple[FloatArray, str]:
     """Time in the unit that suits its span, and the unit's name."""
     return (time_s, "s") if len(time_s) and time_s[-1] - time_s[0] > 1 else (1e3 * time_s, "ms")
 
 
 def png_of(figure: Figure) -> bytes:
-    """Return a figure as PNG; equal figures give equal bytes."""
-    into = BytesIO()
-    figure.savefig(into, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
+    """Return a figure, which is finished by that, as PNG; equal figures give equal bytes."""
+    into, lightly = BytesIO(), {"compress_level": PNG_LEVEL}
+    _arrange(figure)
+    figure.savefig(into, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None}, pil_kwargs=lightly)
     return into.getvalue()
 
 
 def svg_of(figure: Figure) -> bytes:
-    """Return a figure as SVG, its letters as letters; equal figures give equal bytes."""
+    """Return a figure, which is finished by that, as SVG, its letters as letters; equal figures give equal bytes."""
     into = BytesIO()
+    _arrange(figure)
     with rc_context({"svg.fonttype": "none", "svg.hashsalt": "gramoscope"}):
         figure.savefig(into, format="svg", metadata={"Date": None, "Creator": None})
     return into.getvalue()
+
+
+def _arrange(figure: Figure) -> None:
+    """Arrange the axes once and for all: to do it while saving, matplotlib draws everything twice."""
+    layout = figure.get_layout_engine()
+    if layout is not None:
+        layout.execute(figure)
+        figure.set_layout_engine("none")
 
 
 def save_png(figure: Figure, path: str | os.PathLike[str]) -> None:

@@ -18,8 +18,6 @@ from gramoscope.listening import ink
 from gramoscope.listening.ink import readable_time
 
 WIDTH_IN, HEIGHT_IN = 4.6, 3.1
-NOTHING = (1e-3, 1.0)
-"""The upright axis of what has no positive values."""
 SHARES = (("measured", ink.BLUE), ("bridged", ink.ORANGE), ("missing", ink.VERMILLION))
 
 
@@ -36,7 +34,7 @@ def band_figure(bands: Mapping[str, Any]) -> Figure:
     axes.fill_between(centre, error, sound, where=sound > error, color=ink.SKY, alpha=0.25, lw=0)
     axes.loglog(centre, sound, color=ink.BLUE, linewidth=1.6, label="sound")
     axes.loglog(centre, error, color=ink.VERMILLION, linewidth=1.6, linestyle=(0, (4, 2)), label="claimed error")
-    _whole_decades(axes)
+    ink.whole_decades(axes)
     _frequencies(axes, "rms in a third of an octave (cm/s)")
     ink.legend_above(axes, columns=2)
     return figure
@@ -47,7 +45,7 @@ def density_figure(frequency_hz: FloatArray, density_m2_s2_per_hz: FloatArray, *
     figure, axes = _blank()
     shown = (frequency_hz >= 20.0) & (frequency_hz <= highest_hz)
     axes.loglog(frequency_hz[shown], 100 * np.sqrt(density_m2_s2_per_hz[shown]), color=ink.VERMILLION, linewidth=1.6)
-    _whole_decades(axes)
+    ink.whole_decades(axes)
     _frequencies(axes, "claimed error (cm/s per √Hz)")
     return figure
 
@@ -77,13 +75,14 @@ def share_figure(along_time: Mapping[str, Any]) -> Figure:
     floor = np.zeros(count)
     for name, colour in SHARES:
         top = floor + 100 * np.asarray(along_time[name], np.float64)
-        above.stairs(top, edge, baseline=floor, fill=True, color=colour, label=name)
+        above.fill_between(edge, _to_the_end(floor), _to_the_end(top), step="post", color=colour, lw=0, label=name)
         floor = top
     above.set_ylim(0, 100)
     for name, colour, label in (("rms_cm_s", ink.BLUE, "sound"), ("sigma_rms_cm_s", ink.VERMILLION, "claimed error")):
-        below.stairs(_positive(along_time[name]), edge, baseline=None, color=colour, linewidth=1.3, label=label)
+        values = _to_the_end(_positive(along_time[name]))
+        below.plot(edge, values, drawstyle="steps-post", color=colour, linewidth=1.3, label=label)
     below.set_yscale("log")
-    _whole_decades(below)
+    ink.whole_decades(below)
     for axes, x, y, columns in ((above, "", "share (%)", 3), (below, f"time ({unit})", "rms (cm/s)", 2)):
         axes.margins(x=0.0)
         ink.dress(axes, x=x, y=y)
@@ -97,18 +96,14 @@ def _positive(values: Sequence[float | None] | FloatArray) -> FloatArray:
     return np.where(known > 0, known, np.nan)
 
 
+def _to_the_end(steps: FloatArray) -> FloatArray:
+    """The height of each step where it begins, and of the last one where it ends."""
+    return np.append(steps, steps[-1:])
+
+
 def _blank() -> tuple[Figure, Axes]:
     figure = ink.blank_figure(WIDTH_IN, HEIGHT_IN)
     return figure, figure.subplots()
-
-
-def _whole_decades(axes: Axes) -> None:
-    """Let the upright axis, a logarithmic one, run from a power of ten to another, and name those alone."""
-    low, high = axes.get_ylim()
-    if low <= 0:  # nothing was drawn that such an axis could show
-        low, high = NOTHING
-    axes.set_ylim(10 ** np.floor(np.log10(low)), 10 ** np.ceil(np.log10(high)))
-    axes.yaxis.set_minor_formatter(NullFormatter())
 
 
 def _frequencies(axes: Axes, y: str) -> None:
