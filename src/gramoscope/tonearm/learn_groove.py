@@ -24,12 +24,12 @@ GATE = 4.0
 """Samples further than this many standard errors from their prediction count as if they lay right there."""
 DRIFT = np.array([0.7, 0.35, 0.25, 0.5, 0.35])
 """How much λ, μ, ν, the wide share and the share are expected to change from one learning to the next, e-folds."""
-UNHEARD = np.array([np.inf, np.inf, 0.25, 0.6, np.inf])
+UNHEARD = np.array([np.inf, np.inf, 0.225, 0.6, np.inf])
 """How well they are known before anything was learned, e-folds: nothing of the body, something of what is wide."""
 WIDE_SHARES = (1e-3, 0.3)
 """Least and largest √(var v / var u)."""
-USUAL_WIDE_SHARE = 0.025
-"""− 32 dB. Where what is wide drowns, only this is known of it. Recordings of speech, song, piano and orchestra, where they
+USUAL_WIDE_SHARE = 0.02
+"""− 34 dB. Where what is wide drowns, only this is known of it. Recordings of speech, song, piano and orchestra, where they
 were heard well enough, had 0.02 … 0.1."""
 SHARES = (0.3, 10.0)
 """Least and largest bend, for each unit of the level."""

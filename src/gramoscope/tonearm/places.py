@@ -67,7 +67,7 @@ class PlaceSmoother:
     corner_limits_hz: tuple[float, float] = (300.0, 20_000.0)
     cutoff_limits_hz: tuple[float, float] = (2_000.0, 60_000.0)
     width_limits_hz: tuple[float, float] = (6_000.0, 30_000.0)
-    usual_width_hz: float = 9_500.0
+    usual_width_hz: float = 8_000.0
     floor_m_s: float = 3e-4
     other_floor_m_s: float = 2e-4
 
