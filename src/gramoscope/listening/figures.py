@@ -140,8 +140,9 @@ def frame_figure(
     """Draw one frame with the stripes found in it, small, for a page; parameters as in `groove_figure`."""
     require(image.ndim == 2, f"an image of shape {image.shape}", "shape (row, column)")
     width_in = 4.6
-    figure = ink.blank_figure(width_in, width_in * image.shape[0] / image.shape[1] + 0.5)
-    axes = figure.subplots()
+    across_in = width_in - ink.MARGINS_IN["left"] - ink.MARGINS_IN["right"]
+    along_in = ink.MARGINS_IN["bottom"] + ink.MARGINS_IN["top"]
+    figure, (axes,) = ink.small_figure(width_in, across_in * image.shape[0] / image.shape[1] + along_in, 1.0)
     _draw_frame(axes, image, white_level=white_level, pixel_pitch_m=pixel_pitch_m)
     for line, colour in zip(stripes, _cycled(len(stripes)), strict=True):
         _draw_stripe(axes, StripeLine(*line), colour=colour, height_px=image.shape[0], pixel_pitch_m=pixel_pitch_m)

@@ -68,8 +68,7 @@ def share_figure(along_time: Mapping[str, Any]) -> Figure:
     along_time : mapping
         As in the report: `step_s`, the shares, `rms_cm_s`, `sigma_rms_cm_s`.
     """
-    figure = ink.blank_figure(WIDTH_IN, 1.35 * HEIGHT_IN)
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=[1.0, 1.2])
+    figure, (above, below) = ink.small_figure(WIDTH_IN, 1.35 * HEIGHT_IN, 1.0, 1.2)
     count = len(along_time["measured"])
     edge, unit = readable_time(np.arange(count + 1) * along_time["step_s"])
     floor = np.zeros(count)
@@ -102,8 +101,8 @@ def _to_the_end(steps: FloatArray) -> FloatArray:
 
 
 def _blank() -> tuple[Figure, Axes]:
-    figure = ink.blank_figure(WIDTH_IN, HEIGHT_IN)
-    return figure, figure.subplots()
+    figure, (axes,) = ink.small_figure(WIDTH_IN, HEIGHT_IN, 1.0)
+    return figure, axes
 
 
 def _frequencies(axes: Axes, y: str) -> None:
