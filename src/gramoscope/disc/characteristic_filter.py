@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -94,7 +93,6 @@ class CharacteristicFilter:
         return late[self.look_ahead :]
 
 
-@lru_cache(maxsize=32)
 def playback_filter(characteristic: Characteristic, *, rate_hz: float) -> CharacteristicFilter:
     """Return the filter that undoes a recording characteristic.
 
