@@ -12,10 +12,13 @@ from gramoscope.errors import ArgumentError
 from gramoscope.pickup.overlay import TILE_COLUMNS, TILE_ROWS
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.reading import Evidence
+from gramoscope.pickup.texture.sharpness import sharpness
 from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.pickup.texture_likelihood import (
     STRIDE_PX,
+    Sight,
     TextureLikelihood,
+    TexturePickup,
     samples_of,
     tiles_to_draw,
     worth_reading,
@@ -81,6 +84,17 @@ def test_a_stretch_that_surprises_has_wider_error_bars(surprise: float, factor: 
     _, wider = samples_of(stretch, replace(usual, surprise=np.array([1.0, surprise])))
     np.testing.assert_array_equal(wider[0], sigma[0])
     np.testing.assert_allclose(wider[1], factor * sigma[1])
+
+
+def test_nothing_but_noise_has_no_support_in_a_passage_that_shows_stripes() -> None:
+    bench = filming_bench(height_px=640)
+    cartridge = TextureLikelihood(bench)
+    noise = np.random.default_rng(4).normal(120, 4, (4, 640, 640)).astype(np.uint8)
+    seen = Sight(0, np.zeros(4), np.zeros(3), sharpness(noise, np.zeros(4)))
+    layout = StripeLayout.of_bench(bench, edge_margin_px=-16.0)
+    _, alone = TexturePickup(cartridge, layout).searched(seen)
+    _, among = TexturePickup(cartridge, layout, usual_sharpness=20 * seen.sharp.typical).searched(seen)
+    assert alone.max() > cartridge.rules.least_support > 2 * among.max()
 
 
 def test_ends_that_cannot_be_read_are_drawn_all_the_same() -> None:

@@ -11,12 +11,10 @@ from io import BytesIO
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
-from matplotlib.ticker import NullFormatter
 
 from gramoscope.conventions import FloatArray
 from gramoscope.listening.whole_file import written_whole
@@ -39,7 +37,7 @@ MEDIUM = 10.0
 LARGE = 13.0
 LEGEND_LINE = 1.55 * SMALL
 PNG_LEVEL = 1
-"""A picture of a film hardly gets smaller by more."""
+"""A picture of a film gets a sixth larger so than packed as usual, in a third of the time."""
 
 
 def blank_figure(width_in: float, height_in: float) -> Figure:
@@ -117,18 +115,6 @@ def legend_above(axes: Axes, *, columns: int, side: Literal["left", "right"] = "
     )
 
 
-def whole_decades(axes: Axes) -> None:
-    """Let the upright axis, a logarithmic one, run from a power of ten to another, and name those alone."""
-    low, high = axes.get_ylim()
-    if low <= 0:  # nothing was drawn that such an axis could show
-        low, high = NOTHING
-    axes.set_ylim(10 ** np.floor(np.log10(low)), 10 ** np.ceil(np.log10(high)))
-    axes.yaxis.set_major_formatter(lambda value, _: power_of_ten(round(np.log10(value))))
-    axes.yaxis.set_minor_formatter(NullFormatter())
-
-
-NOTHING = (1e-3, 1.0)
-"""The upright axis of what has no positive values."""
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 

@@ -18,6 +18,8 @@ from gramoscope.listening import ink
 from gramoscope.listening.ink import readable_time
 
 WIDTH_IN, HEIGHT_IN = 4.6, 3.1
+NOTHING = (1e-3, 1.0)
+"""The upright axis of what has no positive values."""
 SHARES = (("measured", ink.BLUE), ("bridged", ink.ORANGE), ("missing", ink.VERMILLION))
 
 
@@ -34,7 +36,7 @@ def band_figure(bands: Mapping[str, Any]) -> Figure:
     axes.fill_between(centre, error, sound, where=sound > error, color=ink.SKY, alpha=0.25, lw=0)
     axes.loglog(centre, sound, color=ink.BLUE, linewidth=1.6, label="sound")
     axes.loglog(centre, error, color=ink.VERMILLION, linewidth=1.6, linestyle=(0, (4, 2)), label="claimed error")
-    ink.whole_decades(axes)
+    _whole_decades(axes)
     _frequencies(axes, "rms in a third of an octave (cm/s)")
     ink.legend_above(axes, columns=2)
     return figure
@@ -45,7 +47,7 @@ def density_figure(frequency_hz: FloatArray, density_m2_s2_per_hz: FloatArray, *
     figure, axes = _blank()
     shown = (frequency_hz >= 20.0) & (frequency_hz <= highest_hz)
     axes.loglog(frequency_hz[shown], 100 * np.sqrt(density_m2_s2_per_hz[shown]), color=ink.VERMILLION, linewidth=1.6)
-    ink.whole_decades(axes)
+    _whole_decades(axes)
     _frequencies(axes, "claimed error (cm/s per √Hz)")
     return figure
 
@@ -81,7 +83,7 @@ def share_figure(along_time: Mapping[str, Any]) -> Figure:
         values = _to_the_end(_positive(along_time[name]))
         below.plot(edge, values, drawstyle="steps-post", color=colour, linewidth=1.3, label=label)
     below.set_yscale("log")
-    ink.whole_decades(below)
+    _whole_decades(below)
     for axes, x, y, columns in ((above, "", "share (%)", 3), (below, f"time ({unit})", "rms (cm/s)", 2)):
         axes.margins(x=0.0)
         ink.dress(axes, x=x, y=y)
@@ -103,6 +105,16 @@ def _to_the_end(steps: FloatArray) -> FloatArray:
 def _blank() -> tuple[Figure, Axes]:
     figure, (axes,) = ink.small_figure(WIDTH_IN, HEIGHT_IN, 1.0)
     return figure, axes
+
+
+def _whole_decades(axes: Axes) -> None:
+    """Let the upright axis, a logarithmic one, run from a power of ten to another, and name those alone."""
+    low, high = axes.get_ylim()
+    if low <= 0:  # nothing was drawn that such an axis could show
+        low, high = NOTHING
+    axes.set_ylim(10 ** np.floor(np.log10(low)), 10 ** np.ceil(np.log10(high)))
+    axes.yaxis.set_major_formatter(lambda value, _: ink.power_of_ten(round(np.log10(value))))
+    axes.yaxis.set_minor_formatter(NullFormatter())
 
 
 def _frequencies(axes: Axes, y: str) -> None:

@@ -233,8 +233,7 @@ def test_sharpness_does_not_depend_on_brightness_and_contrast() -> None:
 
 
 @pytest.mark.parametrize(("usual", "share"), [(0.0, 1), (1.0, 1), (4.0, 1), (8.0, 0.5), (400.0, 0.01)])
-def test_a_picture_of_nothing_but_noise_is_not_sharp_among_others(usual: float, share: float) -> None:
-    """Its own noise is as large as its own noise."""
+def test_a_picture_that_is_faint_among_others_is_less_sharp(usual: float, share: float) -> None:
     found = sharpness(_texture(83.0), STILL)
     np.testing.assert_allclose(found.among(usual * found.typical), share * found.relative, rtol=1e-6)
 

@@ -280,8 +280,9 @@ class GrooveSearch:
         costs = np.array([self.step_cost * GRID_PX if use else 1.0 for use in used])
         absent = np.float32(self.absent)
         steps, costs = steps[::-1].copy(), costs[::-1].copy()
-        looks = looks.reshape(half.shape)
-        path, _ = _common_path(coarse, swing.astype(np.float32), looks, first_row, seen, absent, steps, costs)
+        path, _ = _common_path(
+            coarse, swing.astype(np.float32), looks.reshape(half.shape), first_row, seen, absent, steps, costs
+        )
         return lateral[path[1]].astype(np.float64), vertical[path[0]].astype(np.float64)
 
     def _own_paths(
