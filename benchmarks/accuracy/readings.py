@@ -175,9 +175,7 @@ COLUMNS = (
 )
 
 
-def rows(
-    table: Table, recipes: list[str], only: set[str], seconds: float, workdir: Path | None, *, seed: int = 0
-) -> Iterator[list[str]]:
+def rows(table: Table, recipes: list[str], only: set[str], seconds: float, workdir: Path | None) -> Iterator[list[str]]:
     """Yield the rows that the table lacks, scene by scene, each filmed once."""
     for judged in PRACTICE:
         folder = SHARED / "captures" / judged.name
@@ -186,14 +184,14 @@ def rows(
     for case in CASES:
         wanted = [recipe for recipe in recipes if not table.has(case.name, recipe)]
         if wanted and (not only or case.name in only) and case.can_be_filmed:
-            yield from _filmed_and_played(table, wanted, case, seconds, workdir, seed=seed)
+            yield from _filmed_and_played(table, wanted, case, seconds, workdir)
 
 
 def _filmed_and_played(
-    table: Table, recipes: list[str], case: Case, seconds: float, workdir: Path | None, *, seed: int
+    table: Table, recipes: list[str], case: Case, seconds: float, workdir: Path | None
 ) -> Iterator[list[str]]:
     with tempfile.TemporaryDirectory() as passing:
-        folder = filmed(case, workdir or Path(passing), seconds, seed=seed)
+        folder = filmed(case, workdir or Path(passing), seconds)
         yield from _played(table, recipes, Judged(case.name, scene_of(case)), folder)
 
 
@@ -213,7 +211,6 @@ def arguments() -> argparse.ArgumentParser:
     parser.add_argument("--recipe", action="append", help=f"name or file; may be repeated; default {RECIPES}")
     parser.add_argument("--only", default="", help="scenes by name, with commas between them; all when left out")
     parser.add_argument("--seconds", type=float, default=0.1)
-    parser.add_argument("--seed", type=int, default=0, help="of the records; those of the table have 0")
     parser.add_argument("--workdir", type=Path, help="keep films here, and use those that lie here")
     parser.add_argument("--table", type=Path, help="page to keep the rows in")
     parser.add_argument("--again", action="store_true", help="make rows that the table holds again")
@@ -228,8 +225,7 @@ def main() -> int:
     known = Table(None, "", COLUMNS, rows={} if given.again else table.rows)
     if given.workdir is not None:
         given.workdir.mkdir(parents=True, exist_ok=True)
-    only = set(filter(None, given.only.split(",")))
-    for cells in rows(known, recipes, only, given.seconds, given.workdir, seed=given.seed):
+    for cells in rows(known, recipes, set(filter(None, given.only.split(","))), given.seconds, given.workdir):
         print(" | ".join(cells), flush=True)
         table.add(cells)
     return 0

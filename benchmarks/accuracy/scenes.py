@@ -210,15 +210,14 @@ def _bench_of(case: Case, height_px: int) -> Bench:
     )
 
 
-def film_case(case: Case, folder: Path, seconds: float, *, seed: int = 0, workers: int = 2) -> None:
-    """Film a case into a folder; another seed is another record: other grain, dust, chips and noise."""
+def film_case(case: Case, folder: Path, seconds: float, *, workers: int = 2) -> None:
+    """Film a case into a folder."""
     samples, rate_hz = sound_of(case, seconds)
     height_px = framing_height_px(samples, rate_hz, level_m_s=case.level_m_s, disc=_bench_of(case, 512).disc)
-    scene = replace(scene_of(case, height_px=height_px), seed=seed)
-    film_sound(samples, rate_hz, scene, folder, overwrite=True, workers=workers)
+    film_sound(samples, rate_hz, scene_of(case, height_px=height_px), folder, overwrite=True, workers=workers)
 
 
-def filmed(case: Case, workdir: Path, seconds: float, *, seed: int = 0, workers: int = 2) -> Path:
+def filmed(case: Case, workdir: Path, seconds: float, *, workers: int = 2) -> Path:
     """Return the film of a case, made if there is none of these seconds.
 
     Parameters
@@ -228,13 +227,12 @@ def filmed(case: Case, workdir: Path, seconds: float, *, seed: int = 0, workers:
         The film lies in its folder `name`. Beside it `name.txt` says what was filmed; where that says something else the film
         is made again, and a film without it is taken as it is.
     seconds : float
-    seed : int
     """
     folder, told = workdir / case.name, workdir / f"{case.name}.txt"
-    wanted = f"{seconds:g} s of {case}\n" + (f"seed {seed}\n" if seed else "")
+    wanted = f"{seconds:g} s of {case}\n"
     if (folder / "truth.npz").is_file() and (not told.is_file() or told.read_text("utf-8") == wanted):
         return folder
     told.unlink(missing_ok=True)
-    film_case(case, folder, seconds, seed=seed, workers=workers)
+    film_case(case, folder, seconds, workers=workers)
     told.write_text(wanted, "utf-8")
     return folder
