@@ -33,11 +33,12 @@ from gramoscope.pickup.overlay import (
 from gramoscope.pickup.processor import Processor
 from gramoscope.pickup.registration import overlap_textures, strip_columns
 from gramoscope.pickup.texture.calibration import aligned_layout, calibration_of
+from gramoscope.pickup.texture.coarse_path import astray, settled
 from gramoscope.pickup.texture.following import TAPS, wide_rows
 from gramoscope.pickup.texture.groove_search import GrooveSearch
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.learning import Learning, Lesson
-from gramoscope.pickup.texture.reading import Evidence, Model, Rules, read, settled, spaced
+from gramoscope.pickup.texture.reading import Evidence, Model, Rules, read, spaced
 from gramoscope.pickup.texture.sharpness import CELL_PX, Sharpness
 from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.quality import Quality, no_flags
@@ -312,7 +313,10 @@ class TexturePickup:
         path = _by_column(coarse[0], x, cell, smooth_cells=1.5)
         support = _by_column(coarse[1], x, cell, smooth_cells=SUPPORT_CELLS)
         walls = np.array([support[self.layout.wall == wall].max(axis=0, initial=0.0) for wall in (INNER, OUTER)])
-        path = settled(path, walls, self.cartridge.bench.disc.cut, self.cartridge.rules)
+        cut, rules = self.cartridge.bench.disc.cut, self.cartridge.rules
+        lost = astray(path, walls, cut, least_support=rules.least_support)
+        support = np.where(lost[self.layout.wall], 0.0, support)
+        path = settled(path, np.where(lost, 0.0, walls), cut, smooth_px=rules.smooth_other_px)
         rows = np.full((self.layout.wall.size, width), np.nan)
         rows[:, read] = self.layout.rows(path)
         ends = strip_columns(group, width=width, group_step_m=self.cartridge.bench.sequence.group_step_m)

@@ -24,7 +24,6 @@ from gramoscope.pickup.texture.reading import (
     Rules,
     evidence,
     read,
-    settled,
     spaced,
     step,
 )
@@ -115,36 +114,6 @@ def test_steps_are_as_quiet_as_the_rules_allow_and_not_quieter_than_sound_needs(
     assert noise_px(Rules(smooth_px=20.0, step_noise_px=0.18)) == pytest.approx(0.18, rel=0.15)
     least = 1 / np.sqrt(2 * np.sqrt(np.pi) * 20 * information)
     assert noise_px(Rules(smooth_px=20.0, step_noise_px=5.0)) == pytest.approx(least, rel=0.15)
-
-
-JITTER = np.random.default_rng(8).normal(size=(2, WIDTH))
-
-
-@pytest.mark.parametrize(("cut", "sign"), [("lateral", 1.0), ("vertical", -1.0)])
-def test_settled_paths_swing_together_and_keep_their_distance(cut: Cut, sign: float) -> None:
-    swing = 12 * np.sin(2 * np.pi * COLUMN / 400 + 0.4)
-    path = np.array([sign * swing + sign * -1.5, swing + 1.5])
-    found = settled(path + JITTER, np.ones((2, WIDTH)), cut, RULES)
-    # what one wall has alone is smoothed away; what is common is left for the exact reading
-    apart = sign * found[INNER] - found[OUTER]
-    assert np.std(apart) < 0.35 * np.std(JITTER[INNER] - JITTER[OUTER])
-    assert apart.mean() == pytest.approx(-3.0, abs=0.6)
-    np.testing.assert_allclose(settled(path, np.ones((2, WIDTH)), cut, RULES), path, atol=0.02)
-
-
-def test_a_wall_without_support_takes_the_path_of_the_other() -> None:
-    swing = 12 * np.sin(2 * np.pi * COLUMN / 400 + 0.4)
-    support = np.ones((2, WIDTH))
-    support[INNER, 300:500] = 0.0
-    path = np.array([swing, swing])
-    path[INNER, 300:500] += 7.0
-    found = settled(path, support, "lateral", RULES)
-    assert np.abs(found - swing).max() < 0.1
-
-
-def test_walls_of_a_stereo_cut_are_left_alone() -> None:
-    path = JITTER.copy()
-    np.testing.assert_array_equal(settled(path, np.ones((2, WIDTH)), "stereo", RULES), path)
 
 
 def test_a_stretch_that_is_longer_than_the_passage_taught_is_refused(another: Stretch, layout: StripeLayout) -> None:

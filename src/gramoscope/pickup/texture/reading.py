@@ -19,12 +19,13 @@ import numpy as np
 from gramoscope.conventions import INNER, OUTER, Float32Array, FloatArray
 from gramoscope.disc.formats import Cut
 from gramoscope.errors import require
+from gramoscope.pickup.texture.coarse_path import sign_of
 from gramoscope.pickup.texture.filter_bank import FilterBank
 from gramoscope.pickup.texture.following import channels, follow
 from gramoscope.pickup.texture.hearing import Ear, add_up, clear_columns, ear_of
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.likelihood import StripeStatistics, quiet_powers
-from gramoscope.pickup.texture.smoothing import smooth, smoothed
+from gramoscope.pickup.texture.smoothing import smooth
 from gramoscope.pickup.texture.spectrum import Band, filtered
 from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.pickup.texture.tone import Tone
@@ -179,13 +180,8 @@ def step(found: Evidence, cut: Cut, rules: Rules) -> FloatArray:
         for wall in (INNER, OUTER):
             steps_of(found.score[wall], found.information[wall], smooth_px, rules.largest_step_px, moved[wall])
     else:
-        _step_together(found.score, found.information, _sign_of(cut), limits, rules.smooth_other_px, moved)
+        _step_together(found.score, found.information, sign_of(cut), limits, rules.smooth_other_px, moved)
     return moved
-
-
-def _sign_of(cut: Cut) -> FloatArray:
-    """How the walls move when the groove moves in the direction of its cut."""
-    return np.array([1.0, 1.0] if cut == "lateral" else [-1.0, 1.0])
 
 
 @numba.njit(cache=True, nogil=True)
@@ -234,27 +230,6 @@ def _step_together(score, information, sign, limits, smooth_other_px, moved):  #
     for x in range(width):
         moved[INNER, x] = sign[INNER] * (common[x] - apart[x])
         moved[OUTER, x] = sign[OUTER] * (common[x] + apart[x])
-
-
-def settled(displacement_px: FloatArray, support: FloatArray, cut: Cut, rules: Rules) -> FloatArray:
-    """Return coarse paths without the jitter of single walls: the difference that the cut does not use is smoothed.
-
-    Parameters
-    ----------
-    displacement_px, support : float64 arrays, shape (2, column)
-        From the coarse search, and how sharp each wall was found; the wall with the better support counts for more.
-    """
-    if cut == "stereo":
-        return displacement_px
-    sign = _sign_of(cut)[:, np.newaxis]
-    signed = sign * displacement_px
-    weight = support**2 + 1e-4
-    inner, outer = weight
-    both = inner * outer / (inner + outer)
-    apart = smoothed(both * (signed[OUTER] - signed[INNER]) / 2, rules.smooth_other_px)
-    apart = apart / smoothed(both, rules.smooth_other_px)
-    middle = (weight * (signed + np.array([[1.0], [-1.0]]) * apart)).sum(axis=0) / weight.sum(axis=0)
-    return np.asarray(sign * (middle + np.array([[-1.0], [1.0]]) * apart))
 
 
 def read(stretch: Stretch, models: Sequence[Model], cut: Cut, rules: Rules) -> tuple[Stretch, Evidence]:
