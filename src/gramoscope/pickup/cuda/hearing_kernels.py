@@ -52,28 +52,31 @@ def whiten(raw, half_taps, white):  # type: ignore[no-untyped-def]
 
 @cuda.jit
 def texture_power(white, usual, power):  # type: ignore[no-untyped-def]
-    """Write [stripe, column], how much of the usual texture there is."""
-    x, i = cuda.grid(2)
-    if i < power.shape[0] and x < power.shape[1]:
+    """Write [half, stripe, column], how much there is of the usual texture, and of anything."""
+    x, i, half = cuda.grid(3)
+    if half < power.shape[0] and i < power.shape[1] and x < power.shape[2]:
         total = float32(0)
-        for d in range(usual.shape[2]):
+        count = usual.shape[2] // 2
+        for d in range(half * count, (half + 1) * count):
             seen = float32(0)
             for c in range(usual.shape[1]):
                 seen += white[i, x, c] * usual[i, c, d]
             total += seen * seen
-        power[i, x] = total
+        power[half, i, x] = total
 
 
 @cuda.jit
 def believe(power, clear, reach, low, high, valid):  # type: ignore[no-untyped-def]
     """Write which clear columns have about the texture that they should; see `texture.likelihood.within`."""
     x, i = cuda.grid(2)
-    if i < power.shape[0] and x < power.shape[1]:
-        total = float32(0)
+    if i < power.shape[1] and x < power.shape[2]:
+        texture, anything = float32(0), float32(0)
         for k in range(x - reach, x + reach + 1):
-            total += power[i, min(max(k, 0), power.shape[1] - 1)]
-        mean = total / float32(2 * reach + 1)
-        valid[i, x] = 1 if clear[i, x] != 0 and low <= mean and mean <= high else 0
+            there = min(max(k, 0), power.shape[2] - 1)
+            texture += power[0, i, there]
+            anything += power[1, i, there]
+        count = float32(2 * reach + 1)
+        valid[i, x] = 1 if clear[i, x] != 0 and low * count <= texture and anything <= high * count else 0
 
 
 @cuda.jit(device=True)

@@ -26,6 +26,7 @@ from scipy import fft
 from gramoscope.conventions import Float32Array, FloatArray
 from gramoscope.pickup.texture.following import GENTLE, across, shifted
 from gramoscope.pickup.texture.spectrum import Band
+from gramoscope.pickup.texture.vector_lanes import LANES
 
 LEAST_POWER = 1e-6
 """Of the loudest direction: what is weaker in a covariance is taken to be that strong."""
@@ -42,8 +43,8 @@ class FilterBank:
     filters : float32 array, shape (bin in the band, filter, channel)
     sign : float32 array, shape (filter,)
         Whether more energy asks for a path with a higher row number, +1, or a lower one, −1.
-    usual : float32 array, shape (channel, channel)
-        What shows whether there is the usual texture; see `usual_power`.
+    usual : float32 array, shape (channel, 16)
+        What shows whether there is the usual texture, and nothing but it; see `usual_power`.
     """
 
     basis: Float32Array
@@ -52,9 +53,15 @@ class FilterBank:
     usual: Float32Array
 
     def power(self, channels: Float32Array) -> Float32Array:
-        """Return how much texture there is in each column, of channels of shape (column, channel); 1 on average."""
-        seen = channels @ self.usual
-        return np.asarray(np.einsum("xc,xc->x", seen, seen))
+        """Return how much there is in each column, of channels of shape (column, channel); 1 on average.
+
+        Returns
+        -------
+        float32 array, shape (column, 2)
+            Of the texture, and of anything.
+        """
+        seen = (channels @ self.usual).reshape(len(channels), 2, HALF)
+        return np.asarray(np.einsum("xhc,xhc->xh", seen, seen))
 
     def heard(self, channels: Float32Array, *, band: Band, length: int) -> tuple[Float32Array, Float32Array]:
         """Return Σ ± p² and Σ p² in each column.
@@ -165,8 +172,52 @@ def strongest_patterns(covariance: FloatArray, count: int) -> FloatArray:
     return np.asarray(scale[:, None] * vector[:, -count:])
 
 
+def texture_weight(row_power: FloatArray) -> FloatArray:
+    """Return how much each row of a window counts for whether the usual texture is there.
+
+    The quietest row is taken to show none of it: noise, and what is out of focus. Then a share t of the texture gives rows
+    the variance v_r = n + t · (c_r − n), and t is told best by Σ (c_r − n)/v_r² · x_r² (least squares, weighted by the
+    variance of squares of a normal variable); so that it is told best where it is hard to tell, t is `FAINT` here.
+
+    Parameters
+    ----------
+    row_power : float64 array, shape (row,)
+        c, the mean squares of rows; where all are the same, all count.
+
+    Returns
+    -------
+    float64 array, shape (row,)
+        Σ w_r c_r = 1.
+    """
+    power = np.maximum(row_power, 1e-30)
+    quiet = (1 - 1e-6) * power.min()
+    weight = (power - quiet) / (quiet + FAINT * (power - quiet)) ** 2
+    return np.asarray(weight / (weight @ power))
+
+
+FAINT = 0.2
+"""Of the usual texture: with so much of it a wall is there or not."""
+
+
+def row_weights(row_power: FloatArray, rows: slice) -> FloatArray:
+    """Return how much rows count for how much texture there is, and for how much of anything: `rows`, each by its own power.
+
+    Returns
+    -------
+    float64 array, shape (row, 2)
+        With Σ w_r c_r = 1.
+    """
+    anything = np.zeros(row_power.shape)
+    anything[rows] = 1 / np.maximum(row_power[rows], 1e-30)
+    return np.stack([texture_weight(row_power), anything / anything[rows].size], axis=1)
+
+
+HALF = LANES // 2
+"""Of the lanes show the texture, the others anything."""
+
+
 def usual_power(covariance: FloatArray, basis: FloatArray, rows: slice) -> FloatArray:
-    """Return P so that |zᵀP|² is the mean power of rows, each by its usual power, as channels z tell it; 1 on average.
+    """Return P so that the halves of |zᵀP|² are the power of texture and of anything, as channels z tell it; 1 on average.
 
     Parameters
     ----------
@@ -174,16 +225,20 @@ def usual_power(covariance: FloatArray, basis: FloatArray, rows: slice) -> Float
         Of the rows in one column.
     basis : float64 array, shape (row, channel)
     rows : slice
-        Which rows count.
+        Which rows count, where anything counts.
 
     Returns
     -------
-    float64 array, shape (channel, channel)
+    float64 array, shape (channel, 16)
+        Of each form `row_weights` its eight strongest directions.
     """
     seen = basis.T @ covariance @ basis
-    expected = np.linalg.solve(_safe(seen), (covariance @ basis).T)[:, rows]
-    form = (expected / np.maximum(np.diag(covariance)[rows], 1e-30)) @ expected.T
-    return root(form / max(float(np.trace(form @ seen)), 1e-30))
+    expected = np.linalg.solve(_safe(seen), (covariance @ basis).T)
+    usual = np.zeros((2, basis.shape[1], HALF))
+    for half, weight in zip(usual, row_weights(np.diag(covariance), rows).T, strict=True):
+        strongest = root((expected * weight) @ expected.T)[:, -HALF:]
+        half[:, : strongest.shape[1]] = strongest / np.sqrt(max(float(np.sum(strongest * (seen @ strongest))), 1e-30))
+    return np.concatenate(list(usual), axis=1)
 
 
 def common_channels(forms: tuple[FloatArray, ...], spectra: FloatArray, patterns: FloatArray, count: int) -> FloatArray:

@@ -50,7 +50,7 @@ class Ear:
     wall : int64 array, shape (stripe,)
     basis : float32 array, shape (stripe, row, channel)
         Rows as `following` pads them.
-    usual : float32 array, shape (stripe, channel, channel)
+    usual : float32 array, shape (stripe, channel, 16)
     filters : float32 array, shape (stripe, bin in the band, filter, channel)
     sign : float32 array, shape (stripe, filter)
     mean_score, trust, information, score_power : float64 arrays, shape (stripe,)
@@ -81,7 +81,7 @@ class Ear:
     @cached_property
     def in_lanes(self) -> tuple[Float32Array, Float32Array, Float32Array]:
         """The basis, what is usual and the filters, with sixteen channels."""
-        return _in_lanes(self.basis, (2,)), _in_lanes(self.usual, (1, 2)), _in_lanes(self.filters, (3,))
+        return _in_lanes(self.basis, (2,)), _in_lanes(self.usual, (1,)), _in_lanes(self.filters, (3,))
 
 
 def ear_of(
@@ -192,13 +192,14 @@ def _burn(burnt, rows, half_px, clear):  # type: ignore[no-untyped-def]
 def _whiten(window, basis, half_taps, usual, white, power):  # type: ignore[no-untyped-def]
     """Write whitened channels of a window and how much of the usual texture they show; columns in fours, channels sixteen.
 
-    The window's last columns are black where they are not in the picture, of `power.size` columns.
+    The window's last columns are black where they are not in the picture, of as many columns as `power`.
     """
-    width, rows, reach = power.size, window.shape[1], half_taps.size - 1
+    width, rows, reach = len(power), window.shape[1], half_taps.size - 1
     wide = np.empty((len(white) + 2 * reach, LANES), np.float32)
     lines = wide.reshape(wide.size)
     seen, weights, form = window.reshape(window.size), basis.reshape(basis.size), usual.reshape(usual.size)
-    out, powers = white.reshape(white.size), np.empty(len(white), np.float32)
+    out, powers = white.reshape(white.size), np.empty((len(white), 2), np.float32)
+    into = powers.reshape(powers.size)
     for x in range(0, len(white), AT_ONCE):
         mix(seen, x * rows, rows, weights, 0, lines, (reach + x) * LANES)
     wide[reach + len(white) :] = np.float32(0)
@@ -210,7 +211,7 @@ def _whiten(window, basis, half_taps, usual, white, power):  # type: ignore[no-u
             wide[reach + width + k, c] = wide[reach + width - 1 - mirrored, c]
     for x in range(0, len(white), AT_ONCE):
         filter_symmetrically(lines, (reach + x) * LANES, half_taps, reach, out, x * LANES)
-        usual_power(out, x * LANES, form, 0, powers, x)
+        usual_power(out, x * LANES, form, 0, into, 2 * x)
     power[:] = powers[:width]
 
 
@@ -252,7 +253,7 @@ def _listen(columns, rows, clear, half_px, ear, plan, first_bin, limits, said, w
     padded = -(-width // AT_ONCE) * AT_ONCE
     window, white = np.empty((padded, basis.shape[1]), np.float32), np.empty((padded, LANES), np.float32)
     window[width:] = np.float32(0)
-    rooms = window, white, np.empty(width, np.float32), np.empty(width, np.bool_)
+    rooms = window, white, np.empty((width, 2), np.float32), np.empty(width, np.bool_)
     drawn = np.zeros((2 * m, LANES), np.float32)
     one, other, bins = (
         np.empty(m * PAIR, np.float32),

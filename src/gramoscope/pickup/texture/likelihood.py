@@ -239,28 +239,31 @@ def believable(
 
     Parameters
     ----------
-    power : float array, shape (column,)
-        Of the texture, 1 on average.
+    power : float array, shape (column, 2)
+        Of the texture and of anything, 1 on average.
     limits : (float, float)
-        Least and largest power over `smooth_px` columns.
+        The least of the first and the most of the second, over `smooth_px` columns.
 
     Returns
     -------
     bool array, shape (column,)
     """
-    told = np.empty(power.size, np.bool_)
+    told = np.empty(len(power), np.bool_)
     within(power, smooth_px // 2, *limits, told)
     return told
 
 
 @numba.njit(cache=True, nogil=True)
 def within(power, reach, low, high, told):  # type: ignore[no-untyped-def]
-    """Whether the mean over ± reach columns, the ends being held, lies within limits."""
-    width = power.size
-    total = 0.0
+    """Whether the means over ± reach columns, the ends being held, are large enough and small enough; see `believable`."""
+    width = len(power)
+    texture, anything = 0.0, 0.0
     for k in range(-reach, reach + 1):
-        total += power[min(max(k, 0), width - 1)]
+        texture += power[min(max(k, 0), width - 1), 0]
+        anything += power[min(max(k, 0), width - 1), 1]
+    least, most = low * (2 * reach + 1), high * (2 * reach + 1)
     for x in range(width):
-        mean = total / (2 * reach + 1)
-        told[x] = low <= mean <= high
-        total += power[min(x + 1 + reach, width - 1)] - power[max(x - reach, 0)]
+        told[x] = texture >= least and anything <= most
+        enters, leaves = min(x + 1 + reach, width - 1), max(x - reach, 0)
+        texture += power[enters, 0] - power[leaves, 0]
+        anything += power[enters, 1] - power[leaves, 1]

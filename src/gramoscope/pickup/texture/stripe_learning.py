@@ -20,6 +20,7 @@ from gramoscope.pickup.texture.filter_bank import (
     FilterBank,
     common_channels,
     interpolated,
+    row_weights,
     strongest_filters,
     strongest_patterns,
     through_channels,
@@ -118,9 +119,8 @@ class StripeMaterial:
         if not clear.any():
             return
         window = self.model.window(stretch.columns, row)
-        inner = window[:, INNER_ROWS]
-        usual = before.row_power[INNER_ROWS] if before is not None else np.median(inner**2, axis=0) / CHI2_MEDIAN
-        power = inner**2 @ (1 / (usual.size * np.maximum(usual, 1e-12)))
+        usual = before.row_power if before is not None else np.median(window**2, axis=0) / CHI2_MEDIAN
+        power = window**2 @ row_weights(usual, INNER_ROWS)
         weight = softened(clear & believable(power, limits=self.rules.power_limits))
         if weight.sum() > LEAST_WEIGHT:
             total.see(window, weight)

@@ -80,10 +80,20 @@ class _Writer:
 
     def total(self, vector: Value) -> Value:
         """The sum of a vector, halves first."""
-        for far in (8, 4, 2, 1):
+        return self.builder.extract_element(self._folded(vector, (8, 4, 2, 1)), ir.Constant(_INT, 0))
+
+    def totals_of_halves(self, vector: Value) -> tuple[Value, Value]:
+        """The sums of the first and of the last eight of a vector."""
+        folded = self._folded(vector, (4, 2, 1))
+        first, second = (self.builder.extract_element(folded, ir.Constant(_INT, place)) for place in (0, LANES // 2))
+        return first, second
+
+    def _folded(self, vector: Value, distances: tuple[int, ...]) -> Value:
+        """A vector to which those so many places on were added, turn by turn."""
+        for far in distances:
             order = ir.Constant(ir.VectorType(_INT, LANES), [(j + far) % LANES for j in range(LANES)])
             vector = self.builder.fadd(vector, self.builder.shuffle_vector(vector, _ANY, order))
-        return self.builder.extract_element(vector, ir.Constant(_INT, 0))
+        return vector
 
     def call_for(self, array: Value, place: Value) -> None:
         """Tell the processor that this will be read soon; it may lie anywhere."""
@@ -182,8 +192,8 @@ def _power(w: _Writer) -> None:
     w.loop(ir.Constant(_LONG, LANES), channel)
     for k, room in enumerate(sums):
         vector = w.builder.load(room)
-        total = w.total(w.builder.fmul(vector, vector))
-        w.builder.store(total, w.builder.gep(out, [w.plus(place, k)]))
+        for half, total in enumerate(w.totals_of_halves(w.builder.fmul(vector, vector))):
+            w.builder.store(total, w.builder.gep(out, [w.plus(place, 2 * k + half)]))
 
 
 def _butterfly(radix: int) -> Callable[[_Writer], None]:
@@ -344,5 +354,5 @@ def filter_symmetrically(_, wide, middle, taps, reach, out, place):  # type: ign
 
 @_compiled
 def power(_, seen, first, form, begin, out, place):  # type: ignore[no-untyped-def]
-    """Write |zᵀ P|² of four columns z of [column, 16], P being [16, 16]."""
+    """Write |zᵀ P|², of the first eight and of the last eight columns of P [16, 16], for four columns z of [column, 16]."""
     return _function((seen, first, form, begin, out, place), _power)
