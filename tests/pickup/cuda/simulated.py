@@ -24,6 +24,7 @@ from gramoscope.pickup.texture.reading import Model, Rules, read
 from gramoscope.pickup.texture.spectrum import Band, filtered
 from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.pickup.texture.tone import Tone
+from gramoscope.pickup.texture.vector_lanes import LANES
 from gramoscope.pickup.texture_likelihood import samples_of
 from gramoscope.signal_path import FrameGroup
 
@@ -137,7 +138,7 @@ def _ear(stripes: int = 2, channels: int = 3, filters: int = 2, band: Band | Non
         np.arange(stripes),
         np.arange(stripes) % 2,
         basis,
-        rng.normal(size=(stripes, channels, channels)).astype(np.float32),
+        rng.normal(size=(stripes, channels, LANES)).astype(np.float32),
         rng.normal(size=(stripes, bins, filters, channels)).astype(np.float32),
         np.tile(np.array([1, -1], np.float32), (stripes, filters // 2)),
         rng.normal(size=stripes),
@@ -191,8 +192,9 @@ def test_columns_without_the_usual_texture_are_left_out() -> None:
     rows = np.full((1, COLUMNS), 25.2)
     assert _weight(ear, picture, rows, clear, (0.0, np.inf)).min() > 0.99999, "all are believed without limits"
     white = filtered(channels(picture, rows[0], HALF_PX, ear.basis[0, : wide_rows(HALF_PX)]), _whitener(ear))
-    power = ndimage.uniform_filter1d(np.sum((white @ ear.usual[0]) ** 2, axis=1), TEXTURE_PX, mode="nearest")
-    for limits in ((0.0, 0.99 * power.max()), (1.01 * power.min(), np.inf)):
+    halves = (white @ ear.usual[0]).reshape(COLUMNS, 2, LANES // 2)
+    power = ndimage.uniform_filter1d(np.sum(halves**2, axis=2), TEXTURE_PX, axis=0, mode="nearest")
+    for limits in ((0.0, 0.99 * power[:, 1].max()), (1.01 * power[:, 0].min(), np.inf)):
         weight = _weight(ear, picture, rows, clear, limits)
         _, weight_ = PROCESSOR.heard(ear, picture, rows, clear, power_limits=limits)
         assert 0 < weight_[0].mean() < 0.99, "some are left out"

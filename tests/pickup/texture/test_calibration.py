@@ -86,7 +86,7 @@ def test_pictures_that_show_nothing_leave_the_layout_as_the_manifest_has_it() ->
 
 
 def _model(layout: StripeLayout) -> Model:
-    deaf = FilterBank(*(np.zeros(shape, np.float32) for shape in ((19, 3), (1, 2, 3), (2,), (3, 3))))
+    deaf = FilterBank(*(np.zeros(shape, np.float32) for shape in ((19, 3), (1, 2, 3), (2,), (3, 16))))
     one = StripeStatistics(deaf, 4.0, 8.0, 0.0, np.ones(19), 9000)
     return Model(layout, Tone(), np.ones(1), 1, Band(), 64, (None, one, one, one))
 

@@ -10,13 +10,16 @@ from scipy import fft
 
 from gramoscope.conventions import FloatArray
 from gramoscope.pickup.texture.filter_bank import (
+    FAINT,
     LEAST_POWER,
     FilterBank,
     common_channels,
     interpolated,
     root,
+    row_weights,
     strongest_filters,
     strongest_patterns,
+    texture_weight,
     through_channels,
     usual_power,
     witness_forms,
@@ -352,13 +355,15 @@ def _usual(basis: FloatArray, covariance: FloatArray) -> FilterBank:
     return replace(_bank(np.zeros((1, 2, basis.shape[1])), np.array([-1.0, 1.0])), usual=usual)
 
 
-def test_where_channels_show_all_the_power_is_the_mean_of_all_rows_by_their_own() -> None:
+def test_where_channels_show_all_the_power_it_is_that_of_the_rows_by_their_weights() -> None:
     rng = np.random.default_rng(21)
-    covariance, basis = _positive(rng, 9), rng.normal(size=(9, 9))
-    x = np.linalg.cholesky(covariance) @ rng.normal(size=(9, 400))
+    covariance, basis = _positive(rng, 8), rng.normal(size=(8, 8))
+    x = np.linalg.cholesky(covariance) @ rng.normal(size=(8, 400))
     power = _usual(basis, covariance).power((basis.T @ x).T.astype(np.float32))
-    direct = np.mean(x[2:-2] ** 2 / np.diag(covariance)[2:-2, None], axis=0)
+    direct = x.T**2 @ row_weights(np.diag(covariance), slice(2, -2))
     np.testing.assert_allclose(power, direct, atol=2e-3)
+    everything = np.mean(x[2:-2] ** 2 / np.diag(covariance)[2:-2, None], axis=0)
+    np.testing.assert_allclose(power[:, 1], everything, atol=2e-3)
 
 
 def test_the_usual_texture_has_power_one_and_scratches_and_missing_walls_have_not() -> None:
@@ -368,14 +373,46 @@ def test_the_usual_texture_has_power_one_and_scratches_and_missing_walls_have_no
     bank = _usual(basis, covariance)
     x = np.linalg.cholesky(covariance) @ rng.normal(size=(9, 20_000))
 
-    def power(window: np.ndarray) -> float:
-        return float(bank.power((basis.T @ window).T.astype(np.float32)).mean())
+    def power(window: np.ndarray) -> np.ndarray:
+        return np.asarray(bank.power((basis.T @ window).T.astype(np.float32)).mean(axis=0))
 
-    assert power(x) == pytest.approx(1, abs=0.03)
-    assert power(0.1 * x) == pytest.approx(0.01, abs=0.001)
+    np.testing.assert_allclose(power(x), 1, atol=0.03)
+    np.testing.assert_allclose(power(0.1 * x), 0.01, atol=0.001)
     scratched = x.copy()
     scratched[3:6] += 12
-    assert power(scratched) > 4
+    assert power(scratched)[1] > 4
+
+
+def test_noise_alone_is_not_taken_for_texture() -> None:
+    """Half the rows of a window show little but noise, and there a missing wall has all the power that is usual."""
+    rng = np.random.default_rng(24)
+    noise, sharp = 0.02, np.exp(-0.5 * ((np.arange(41) - 20) / 2.0) ** 2)
+    blur = np.exp(-0.5 * ((np.arange(41)[:, None] - np.arange(41)) / 1.5) ** 2)
+    covariance = np.sqrt(np.outer(sharp, sharp)) * blur + noise * np.eye(41)
+    basis = np.linalg.solve(root(covariance).T, np.eye(41)[:, ::3])
+    bank = _usual(basis, covariance)
+    texture, anything = bank.power(
+        rng.normal(0, np.sqrt(noise), (4000, 41)).astype(np.float32) @ basis.astype(np.float32)
+    ).mean(axis=0)
+    assert texture < 0.1 < 0.3 < anything
+
+
+def test_rows_count_for_a_faint_texture_so_that_it_is_told_best() -> None:
+    rng = np.random.default_rng(25)
+    texture, noise = rng.exponential(size=12), 0.1
+    texture[3] = 0.0
+    weight = texture_weight(noise + texture)
+    assert weight @ (noise + texture) == pytest.approx(1)
+
+    def told(weight: np.ndarray) -> float:
+        """Share of the texture over its standard error, by Σ w x² of normal rows."""
+        return float(weight @ texture / np.sqrt(2 * weight**2 @ (noise + FAINT * texture) ** 2))
+
+    best = told(weight)
+    assert best > max(told(weight * (1 + 0.1 * rng.normal(size=12))) for _ in range(100))
+    assert best > 2 * told(1 / (noise + texture))
+    assert best > 1.04 * told(np.ones(12))
+    np.testing.assert_allclose(texture_weight(np.full(6, 3.0)), 1 / 18, rtol=1e-6)
 
 
 def test_filters_at_other_bins_lie_between_those_that_are_known() -> None:

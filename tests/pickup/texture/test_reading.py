@@ -117,7 +117,7 @@ def test_steps_are_as_quiet_as_the_rules_allow_and_not_quieter_than_sound_needs(
 
 
 def test_a_stretch_that_is_longer_than_the_passage_taught_is_refused(another: Stretch, layout: StripeLayout) -> None:
-    deaf = FilterBank(*(np.zeros(shape, np.float32) for shape in ((35, 5), (1, 2, 5), (2,), (5, 5))))
+    deaf = FilterBank(*(np.zeros(shape, np.float32) for shape in ((35, 5), (1, 2, 5), (2,), (5, 16))))
     known = StripeStatistics(deaf, 1.0, 1.0, 0.0, np.ones(35), 900)
     model = Model(layout, Tone(), np.ones(1), 9, Band(), 864, (known, known))
     with pytest.raises(ArgumentError, match="a stretch of 900 columns") as told:
@@ -126,7 +126,7 @@ def test_a_stretch_that_is_longer_than_the_passage_taught_is_refused(another: St
 
 
 def test_a_model_is_as_precise_as_all_its_stripes_together(layout: StripeLayout) -> None:
-    deaf = FilterBank(*(np.zeros(shape, np.float32) for shape in ((35, 5), (1, 2, 5), (2,), (5, 5))))
+    deaf = FilterBank(*(np.zeros(shape, np.float32) for shape in ((35, 5), (1, 2, 5), (2,), (5, 16))))
     one, other = (
         StripeStatistics(deaf, answer, power, 0.0, np.ones(35), columns)
         for answer, power, columns in ((4.0, 8.0, 900), (0.5, 0.1, 7000))

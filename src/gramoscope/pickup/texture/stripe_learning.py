@@ -119,8 +119,8 @@ class StripeMaterial:
         if not clear.any():
             return
         window = self.model.window(stretch.columns, row)
-        usual = before.row_power if before is not None else np.median(window**2, axis=0) / CHI2_MEDIAN
-        power = window**2 @ row_weights(usual, INNER_ROWS)
+        usual = np.median(window**2, axis=0) / CHI2_MEDIAN if before is None else before.row_power
+        power = window**2 @ row_weights(np.asarray(usual, np.float64), INNER_ROWS)
         weight = softened(clear & believable(power, limits=self.rules.power_limits))
         if weight.sum() > LEAST_WEIGHT:
             total.see(window, weight)
