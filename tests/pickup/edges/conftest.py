@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import distance_transform_edt, gaussian_filter
 from scipy.special import ndtr
 
 from gramoscope.conventions import INNER, OUTER, FloatArray
@@ -75,8 +75,10 @@ class Photograph:
         fall = 1 - self.light * (row / self.rows + np.arange(self.columns) / self.columns) / 2
         return level * fall
 
-    def still(self, *, dust: tuple[tuple[float, float, float], ...] = ()) -> StillPicture:
-        """The picture; dust is burnt discs of (row, column, radius)."""
+    def still(
+        self, *, dust: tuple[tuple[float, float, float], ...] = (), halo_px: tuple[float, float] = (0.0, 0.0)
+    ) -> StillPicture:
+        """The picture; dust is burnt discs of (row, column, radius), with halos so long along the columns and the rows."""
         rng = np.random.default_rng(self.seed)
         clean = self.levels()
         grain = rng.standard_normal(clean.shape)
@@ -86,8 +88,14 @@ class Photograph:
         land = np.clip((clean - self.wall) / (self.land - self.wall), 0, 1)
         level = clean + (self.noise + self.land_noise * land) * grain
         row, column = np.mgrid[: self.rows, : self.columns]
+        burnt = np.zeros(clean.shape, np.bool_)
         for at, where, radius in dust:
-            level = np.where((row - at) ** 2 + (column - where) ** 2 < radius**2, 255.0, level)
+            burnt |= (row - at) ** 2 + (column - where) ** 2 < radius**2
+        if all(halo_px):
+            along, across = halo_px
+            distance = np.asarray(distance_transform_edt(~burnt, sampling=(1 / across, 1 / along)))
+            level += (255.0 - level) * np.exp(-distance)
+        level = np.where(burnt, 255.0, level)
         return still(np.clip(np.rint(level), 0, 255).astype(np.uint8))
 
 

@@ -10,6 +10,7 @@ from gramoscope.pickup.edges.column_noise import (
     MOST_NOISES,
     SHRUNK,
     filtered,
+    filtered_beside,
     patch_patterns,
     patchy_covariance,
     seen_covariance,
@@ -35,6 +36,21 @@ def test_of_all_means_that_answer_to_the_gradient_it_errs_least() -> None:
         other = best + 0.1 * (step - GRADIENT[0] * (step @ GRADIENT[0]) / (GRADIENT[0] @ GRADIENT[0]))
         assert other @ GRADIENT[0] == pytest.approx(1.0)
         assert other @ covariance @ other > least
+
+
+def test_a_pattern_of_one_column_is_an_error_of_that_column() -> None:
+    rng = np.random.default_rng(RNG_SEED)
+    root = rng.normal(size=(15, 15))
+    covariance, pattern = root @ root.T + np.eye(15), rng.normal(size=(3, 15))
+    gradient, kept = np.repeat(GRADIENT, 3, axis=0), np.ones((3, 15), np.bool_)
+    pattern[1] = 0.0
+    kept[2, 4:9] = False
+    found = filtered_beside(covariance, kept, gradient, pattern)
+    for column in range(3):
+        which = np.ix_(kept[column], kept[column])
+        both = (covariance + np.outer(pattern[column], pattern[column]))[which]
+        np.testing.assert_allclose(found[column, kept[column]], np.linalg.solve(both, gradient[column, kept[column]]))
+        assert not found[column, ~kept[column]].any()
 
 
 def test_an_edge_that_wanders_changes_no_share() -> None:

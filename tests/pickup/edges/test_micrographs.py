@@ -51,13 +51,14 @@ def test_600_hz_on_both_walls_of_six_grooves(micrograph: Make, picture_of: Make)
     edges = [_places(groove, wall) for groove in grooves for wall in (OUTER, INNER)]
     rates = np.array([_rate(places, 1 / 300, 1 / 120) for places in edges])
     assert np.abs(rates / np.median(rates) - 1).max() < 0.01
+    assert rates.max() / rates.min() < 1.0135
     rows = np.array([row.mean() for _, row, _ in edges])
     # a turn takes as long at every radius: periods get shorter towards the centre, by half a per cent in this picture
     assert np.abs(rates / np.polyval(np.polyfit(rows, rates, 1), rows) - 1).max() < 0.01
     explained = np.array([_fit(places, rate)[1] for places, rate in zip(edges, rates, strict=True)])
     # one edge has a glow along it that looks like land, and one lies in scratches
-    assert np.sort(explained)[2:].min() > 0.98
-    assert explained.min() > 0.95
+    assert np.sort(explained)[2:].min() > 0.985
+    assert explained.min() > 0.97
     assert all(places[0].size > 0.6 * 500 for places in edges)
 
 
@@ -74,8 +75,8 @@ def test_800_hz_on_one_wall_and_3000_hz_on_the_other(micrograph: Make, picture_o
     found = {wall: [_fit(places, slow, fast) for places in mine] for wall, mine in edges.items()}
     tones = {wall: np.array([tone for tone, _ in mine]) for wall, mine in found.items()}
     # no edge loses its tone: not even the fast one, a third as large, beside a wall whose brightness goes with it
-    assert np.sort([explained for _, explained in found[OUTER]])[1:].min() > 0.97
-    assert np.median([explained for _, explained in found[INNER]]) > 0.85
+    assert np.sort([explained for _, explained in found[OUTER]])[1:].min() > 0.98
+    assert min(explained for _, explained in found[INNER]) > 0.86
     assert np.ptp(np.abs(tones[INNER][:, 1])) < 0.25 * np.abs(tones[INNER][:, 1]).mean()
     # in step with the same tone of the other wall, all grooves together
     across = {
@@ -84,9 +85,9 @@ def test_800_hz_on_one_wall_and_3000_hz_on_the_other(micrograph: Make, picture_o
     }
     own = {OUTER: np.abs(tones[OUTER][:, 0]).mean(), INNER: np.abs(tones[INNER][:, 1]).mean()}
     # as displacement, and as velocity, which is what is heard
-    assert 20 * np.log10(own[OUTER] / abs(across[OUTER])) > 28
-    assert 20 * np.log10(own[OUTER] * slow / (abs(across[OUTER]) * fast)) > 18
-    assert 20 * np.log10(own[INNER] * fast / (abs(across[INNER]) * slow)) > 20
+    assert 20 * np.log10(own[OUTER] / abs(across[OUTER])) > 30
+    assert 20 * np.log10(own[OUTER] * slow / (abs(across[OUTER]) * fast)) > 19
+    assert 20 * np.log10(own[INNER] * fast / (abs(across[INNER]) * slow)) > 21
     # and a tenth of either tone on the other wall, in step with it: that is in the picture
     for wall, other in ((OUTER, 1), (INNER, 0)):
         leak = across[wall] / np.abs(tones[1 - wall][:, other]).mean()

@@ -32,6 +32,24 @@ LEAST_EIGENVALUE = 0.02
 LEAST_LIKENESS = 0.1
 
 
+def filtered_beside(covariance: FloatArray, kept: BoolArray, gradient: FloatArray, pattern: FloatArray) -> FloatArray:
+    """Return (Σ + p p')⁻¹ g of each column, p being a pattern of its own that may be in it or not (Sherman and Morrison).
+
+    Parameters
+    ----------
+    covariance : float64 array, shape (place, place)
+    kept : bool array, shape (column, place)
+    gradient, pattern : float64 arrays, shape (column, place)
+    """
+    found = filtered(covariance, kept, gradient)
+    some = pattern.any(axis=1)
+    if some.any():
+        mine, other = pattern[some], filtered(covariance, kept[some], pattern[some])
+        part = (mine * found[some]).sum(axis=1) / (1 + (mine * other).sum(axis=1))
+        found[some] -= part[:, None] * other
+    return found
+
+
 def filtered(covariance: FloatArray, kept: BoolArray, gradient: FloatArray) -> FloatArray:
     """Return Σ⁻¹ g of each column, by the pixels that are kept; 0 at others.
 

@@ -6,6 +6,10 @@ With r the pixels less the profile and g the gradient of the profile with the pl
 
 where Σ is the covariance of the errors of pixels (`column_noise`). What a pixel must not differ by, is counted after the
 step δ has been taken: an edge that has moved is no dust.
+
+Beside burnt light pixels may be brighter by about h (`halo`). Each may be so on its own, which adds h² to the variance of
+that pixel, or all of a column together, which adds h h' to Σ: what looks like a halo moves no edge. What a column has lost
+to dust is counted without regard to halos, which only make its error larger.
 """
 
 from __future__ import annotations
@@ -17,7 +21,13 @@ from scipy.linalg import toeplitz
 from scipy.ndimage import binary_dilation
 
 from gramoscope.conventions import BoolArray, FloatArray
-from gramoscope.pickup.edges.column_noise import filtered, patch_patterns, patchy_covariance, seen_covariance
+from gramoscope.pickup.edges.column_noise import (
+    filtered,
+    filtered_beside,
+    patch_patterns,
+    patchy_covariance,
+    seen_covariance,
+)
 from gramoscope.pickup.edges.edge_band import EdgeBand
 from gramoscope.pickup.edges.edge_profile import AWAY_PX, KNOT_PX, SOFT_STEP_PX, EdgeProfile, along, binned
 from gramoscope.pickup.edges.likeness import likeness
@@ -30,6 +40,9 @@ NARROW = 11
 """In bands of no more rows a neighbouring edge shows too: its motion is no error that pixels share, and each counts alone."""
 FLAT = 0.2
 """Share of the steepest gradient below which a profile counts as flat."""
+
+FAINT = 0.5
+"""A halo that is less than this share of the noise makes neighbours no more alike than they are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,17 +88,18 @@ def column_places(
         step it is too small, for the step takes along what neighbouring pixels share.
     """
     rest = band.level - profile.expected
+    halo = band.halo * np.maximum(band.burnt_level - profile.expected, 0.0)
     noise = _first_noise(band, rest, kept)
-    steps = _steps(rest, band, profile, noise, kept, settled=settled)
+    steps = _steps(rest, halo, profile, noise, kept, settled=settled)
     for _ in range(2):
         own = noise * steps.own(kept)
         dust = band.usable & (np.abs(own) > dust_gate * noise)
         kept = band.usable & ~binary_dilation(dust, np.ones((3, 3), np.bool_))
         noise = _noise(band, rest if settled else own, 0.0 if settled else profile.gradient, noise, kept)
-        steps = _steps(rest, band, profile, noise, kept, settled=settled)
-    # the step has taken noise along where the profile is steep; likeness is judged where it is not
+        steps = _steps(rest, halo, profile, noise, kept, settled=settled)
+    # the step has taken noise along where the profile is steep; likeness is judged where it is not, and beside no halo
     flat = np.abs(profile.gradient) < FLAT * np.abs(profile.gradient).max()
-    beside = np.where(flat & kept, steps.own(kept), 0.0)
+    beside = np.where(flat & kept & (halo < FAINT * noise), steps.own(kept), 0.0)
     errors = steps.covariance
     if not settled:
         errors = errors + toeplitz(likeness(beside.T, rest.shape[1])) - np.eye(rest.shape[1])
@@ -97,35 +111,34 @@ def column_places(
 
 @dataclass(frozen=True, eq=False)
 class _Steps:
-    """Steps of all columns, what they rest on, and the covariance that they were weighed by, in units of the noise."""
+    """Steps of all columns, what they rest on, and the covariance and halo they were weighed by, in units of the noise."""
 
     step: FloatArray
     share: FloatArray
     gain: FloatArray
-    whole: FloatArray
+    lost: FloatArray
     after: FloatArray
     covariance: FloatArray
+    halo: FloatArray
     patchy: bool
 
     def own(self, kept: BoolArray) -> FloatArray:
         """What is left of each pixel after the step, without the patterns that come and go."""
         return filtered(self.covariance, kept, self.after) if self.patchy else self.after
 
-    @property
-    def lost(self) -> FloatArray:
-        """Share of the information that is not kept."""
-        return np.where(self.whole > 0, 1 - self.gain / np.where(self.whole > 0, self.whole, 1.0), 1.0)
-
     def variance(self, covariance: FloatArray) -> FloatArray:
         """Of the steps, by the covariance of the pixels."""
-        return np.asarray(((self.share @ covariance) * self.share).sum(axis=1))
+        by_noise = ((self.share @ covariance) * self.share).sum(axis=1)
+        return np.asarray(by_noise + (self.share * self.halo).sum(axis=1) ** 2)
 
 
 def _steps(
-    rest: FloatArray, band: EdgeBand, profile: EdgeProfile, noise: FloatArray, kept: BoolArray, *, settled: bool
+    rest: FloatArray, halo: FloatArray, profile: EdgeProfile, noise: FloatArray, kept: BoolArray, *, settled: bool
 ) -> _Steps:
     """The step of each column, by generalised least squares (`column_noise`); specks that are kept pull little."""
-    rest, gradient = rest / noise, profile.gradient / noise
+    clear = profile.gradient / noise
+    noise = np.hypot(noise, halo)
+    rest, gradient, halo = rest / noise, profile.gradient / noise, halo / noise
     if rest.shape[1] <= NARROW:
         covariance = np.eye(rest.shape[1])
     elif settled:
@@ -135,12 +148,18 @@ def _steps(
         bright = np.mean(profile.light[:, None] / noise, axis=0)
         patterns = bright[:, None] * patch_patterns(place, SOFT_STEP_PX)
         covariance = patchy_covariance(rest, kept, patterns, np.abs(place) > AWAY_PX)
-    pull = filtered(covariance, kept, gradient)
+    pull = filtered_beside(covariance, kept, gradient, halo)
     gain = (pull * gradient).sum(axis=1)
-    whole = (filtered(covariance, np.ones_like(kept), gradient) * gradient).sum(axis=1)
     share = np.where(gain[:, None] > 0, pull / np.where(gain > 0, gain, 1.0)[:, None], 0.0)
     step = (share * rest).sum(axis=1)
-    return _Steps(step, share, gain, whole, rest - gradient * step[:, None], covariance, patchy=not settled)
+    after, lost = rest - gradient * step[:, None], _lost(covariance, kept, clear)
+    return _Steps(step, share, gain, lost, after, covariance, halo, patchy=not settled)
+
+
+def _lost(covariance: FloatArray, kept: BoolArray, gradient: FloatArray) -> FloatArray:
+    """Share of the information of each column that is not kept."""
+    known, whole = ((filtered(covariance, which, gradient) * gradient).sum(axis=1) for which in (kept, kept | True))
+    return np.where(whole > 0, 1 - known / np.where(whole > 0, whole, 1.0), 1.0)
 
 
 def _strangeness(after: FloatArray, kept: BoolArray, covariance: FloatArray) -> FloatArray:

@@ -9,9 +9,10 @@ import numpy as np
 from scipy.ndimage import binary_erosion, maximum_filter
 
 from gramoscope.conventions import INNER, BoolArray, Float32Array, FloatArray
+from gramoscope.pickup.edges.halo import NO_HALO, Halo
 from gramoscope.signal_path import StillPicture
 
-HALO_PX = 2
+BLUR_PX = 2
 """So far about a burnt pixel its neighbours are spoilt by its blur."""
 BLOB_PX, GLARE_PX = 5, 8
 """A burnt square of this side glares so far about its middle."""
@@ -30,6 +31,11 @@ class EdgeBand:
     usable : bool array, shape (column, place)
         Seen, in the picture, not burnt and not beside a burnt pixel.
     burnt : bool array, shape (column, place)
+        Burnt, or beside a burnt pixel.
+    halo : float64 array, shape (column, place)
+        Share, 0 … 1, of the way to `burnt_level` by which what is burnt brightens a pixel.
+    burnt_level : int
+        From this value on a pixel is burnt.
     towards_land : int
         +1 where the land lies at larger rows, else −1.
     """
@@ -38,6 +44,8 @@ class EdgeBand:
     from_edge_px: FloatArray
     usable: BoolArray
     burnt: BoolArray
+    halo: FloatArray
+    burnt_level: int
     towards_land: int
 
 
@@ -53,7 +61,9 @@ def _gather(image, seen, first, sign, burnt_level, level, usable, burnt):  # typ
                 usable[c, k] = not burnt[c, k]
 
 
-def edge_band(picture: StillPicture, row: FloatArray, *, wall: int, half_px: int, burnt: int) -> EdgeBand:
+def edge_band(
+    picture: StillPicture, row: FloatArray, *, wall: int, half_px: int, burnt: int, halo: Halo = NO_HALO
+) -> EdgeBand:
     """Return the pixels about the course of an edge.
 
     Parameters
@@ -67,6 +77,8 @@ def edge_band(picture: StillPicture, row: FloatArray, *, wall: int, half_px: int
         So many rows on each side.
     burnt : int
         From this value on a pixel is burnt.
+    halo : Halo
+        How far what is burnt brightens its surroundings.
     """
     sign = 1 if wall == INNER else -1
     nearest = np.rint(row).astype(np.int64)
@@ -74,19 +86,21 @@ def edge_band(picture: StillPicture, row: FloatArray, *, wall: int, half_px: int
     shape = (row.size, 2 * reach + 1)
     level, usable, scorched = np.zeros(shape, np.float32), np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
     _gather(picture.image, picture.seen, nearest - sign * reach, sign, burnt, level, usable, scorched)
-    scorched = _with_halo(scorched)
+    share = halo.share(scorched)
+    scorched = _with_surroundings(scorched)
     kept = slice(GLARE_PX, -GLARE_PX)
     place = sign * (nearest - row)[:, None] + np.arange(-half_px, half_px + 1)
-    return EdgeBand(level[:, kept], place, (usable & ~scorched)[:, kept], scorched[:, kept], sign)
+    clean = usable & ~scorched
+    return EdgeBand(level[:, kept], place, clean[:, kept], scorched[:, kept], share[:, kept], burnt, sign)
 
 
-def _with_halo(burnt: BoolArray) -> BoolArray:
+def _with_surroundings(burnt: BoolArray) -> BoolArray:
     """Burnt pixels and those that they spoil: a few about specks and writing, more about blobs."""
     if not burnt.any():
         return burnt
     blobs = binary_erosion(burnt, np.ones((BLOB_PX, BLOB_PX), np.bool_))
     # a filter of squares goes row by row and column by column, where a dilation goes through the square
-    halo, glare = (
-        maximum_filter(part.view(np.uint8), 2 * reach + 1) for part, reach in ((burnt, HALO_PX), (blobs, GLARE_PX))
+    blur, glare = (
+        maximum_filter(part.view(np.uint8), 2 * reach + 1) for part, reach in ((burnt, BLUR_PX), (blobs, GLARE_PX))
     )
-    return np.asarray((halo | glare) > 0)
+    return np.asarray((blur | glare) > 0)

@@ -18,6 +18,7 @@ from gramoscope.pickup.edges.bottom_line import bottom_line
 from gramoscope.pickup.edges.courses import Course, find_courses
 from gramoscope.pickup.edges.groove_choice import CoarseGroove, choose_grooves
 from gramoscope.pickup.edges.groove_pitch import groove_pitches_px
+from gramoscope.pickup.edges.halo import Halo, learn_halo
 from gramoscope.pickup.edges.sharpening import SharpEdge, Sharpening
 from gramoscope.pickup.edges.step_evidence import block_means, burnt_level, step_evidence
 from gramoscope.quality import NOT_MEASURED, Quality, no_flags
@@ -83,9 +84,10 @@ class EdgeCartridge:
         grooves, pitch_px = self.coarse(picture, burnt)
         low, high = HALF_BAND_PX
         half_px = int(np.clip(round(HALF_BAND_SHARE * pitch_px), low, high))
+        halo = learn_halo(picture, burnt)
         found = list[GrooveEdges]()
         for groove in grooves:
-            sharp = self._sharpened(picture, groove, half_px, burnt)
+            sharp = self._sharpened(picture, groove, half_px, burnt, halo)
             if any(edge is not None for edge in sharp):
                 edges = _groove_edges(len(found), sharp, columns)
                 found.append(self._with_bottom(edges, picture, half_px, burnt))
@@ -123,7 +125,7 @@ class EdgeCartridge:
         return choose_grooves(courses, pitch_px=pitch_px, lines=self.appearance is Appearance.BRIGHT_LINES)
 
     def _sharpened(
-        self, picture: StillPicture, groove: CoarseGroove, half_px: int, burnt: int
+        self, picture: StillPicture, groove: CoarseGroove, half_px: int, burnt: int, halo: Halo
     ) -> tuple[SharpEdge | None, SharpEdge | None]:
         """The edges of one groove, `INNER` first."""
 
@@ -132,7 +134,7 @@ class EdgeCartridge:
                 return None
             line = self.appearance is Appearance.BRIGHT_LINES
             edge = self.sharpening.sharpen(
-                picture, course.row, wall=course.wall, half_px=half_px, burnt=burnt, line=line
+                picture, course.row, wall=course.wall, half_px=half_px, burnt=burnt, halo=halo, line=line
             )
             if edge is None or np.mean((edge.flags & np.uint16(NOT_MEASURED)) == 0) < self.least_seen:
                 return None

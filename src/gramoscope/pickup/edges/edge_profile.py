@@ -28,7 +28,8 @@ AWAY_PX = 3.0
 """Land and wall are what lies farther from the edge than this."""
 LIGHT_COLUMNS, PATCH_COLUMNS = 40.0, 12.0
 """Standard deviations of the windows, in columns, over which the light, and land and wall, are averaged."""
-
+HALF_WEIGHT = 0.1
+"""A pixel that the halo of burnt light brightens by this share of the way to burnt weighs half."""
 PATCHES_FROM = 1.5
 """Land and wall are patchy where their means over a window scatter by more than this, squared, times what noise would do."""
 
@@ -102,7 +103,7 @@ def learn_profile(band: EdgeBand, kept: BoolArray, *, line: bool = False) -> Edg
     line : bool
         Whether it is a lone line, with the same on both sides, instead of a step.
     """
-    place, weight = band.from_edge_px, kept.astype(np.float64)
+    place, weight = band.from_edge_px, kept / (1 + (band.halo / HALF_WEIGHT) ** 2)
     half_px = (place.shape[1] - 1) / 2 + 0.5
     light = _light(band, weight, half_px)[:, None]
     value = band.level / light

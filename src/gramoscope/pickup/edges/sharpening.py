@@ -20,6 +20,7 @@ from gramoscope.errors import require
 from gramoscope.pickup.edges.column_places import ColumnPlaces, column_places
 from gramoscope.pickup.edges.edge_band import EdgeBand, edge_band
 from gramoscope.pickup.edges.edge_profile import EdgeProfile, learn_profile
+from gramoscope.pickup.edges.halo import NO_HALO, Halo
 from gramoscope.pickup.edges.pooling import Pooled, pool_columns, pooled
 from gramoscope.pickup.edges.steady_course import FEWEST_PLACES, SteadyCourse, left_by_course, steady_course
 from gramoscope.quality import FlagArray, Quality, no_flags
@@ -97,7 +98,7 @@ class Sharpening:
     rounds: int = 6
     dust_gate: float = 4.0
     column_gate: float = 4.0
-    most_lost: float = 0.6
+    most_lost: float = 0.5
     most_pooled: float = 2.0
     least_amplitude: float = 0.3
 
@@ -110,7 +111,15 @@ class Sharpening:
         require(0 <= self.least_amplitude < 1, f"least_amplitude is {self.least_amplitude}", "from 0, below 1")
 
     def sharpen(
-        self, picture: StillPicture, coarse: FloatArray, *, wall: int, half_px: int, burnt: int, line: bool = False
+        self,
+        picture: StillPicture,
+        coarse: FloatArray,
+        *,
+        wall: int,
+        half_px: int,
+        burnt: int,
+        halo: Halo = NO_HALO,
+        line: bool = False,
     ) -> SharpEdge | None:
         """Return the place of an edge in every column.
 
@@ -125,6 +134,8 @@ class Sharpening:
             So many rows on each side of the course are looked at.
         burnt : int
             From this pixel value on a pixel is burnt.
+        halo : Halo
+            How far what is burnt brightens its surroundings.
         line : bool
             Whether it is a lone line, with the same on both sides; then its place is that of the line.
 
@@ -140,7 +151,7 @@ class Sharpening:
         guide = settled.row
         seen, kept = None, None
         for number in range(self.rounds):
-            band = edge_band(picture, settled.row, wall=wall, half_px=half_px, burnt=burnt)
+            band = edge_band(picture, settled.row, wall=wall, half_px=half_px, burnt=burnt, halo=halo)
             # where nothing is measured yet the coarse course leads, so that it can be found again
             leading = guide if number < self.rounds - 1 else None
             seen = self._look(band, settled, kept, inside, leading, line=line, gated=number >= self.rounds // 2)
