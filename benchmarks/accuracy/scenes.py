@@ -43,6 +43,8 @@ class Case:
     rig : Rig
     like_the_paper : bool
         False stores the film in colour and mirrored both ways.
+    seed : int
+        Of texture, damage, noise and rig.
     """
 
     name: str
@@ -60,6 +62,7 @@ class Case:
     frames: int = 12
     radius_m: float = 0.115
     like_the_paper: bool = True
+    seed: int = 0
 
     @property
     def can_be_filmed(self) -> bool:
@@ -145,6 +148,20 @@ GRID = (
     Case("base-loud", "base at 9 cm/s: the bass swings by ± 270 µm, out of the picture", level_m_s=0.09),
     Case("light-damage", "base, light damage", damage="light"),
     Case("heavy-damage", "base, heavy damage", damage="heavy"),
+    Case(
+        "heavy-5",
+        "heavy damage, modest rig, drawn anew: both walls broken over 0.2 mm",
+        damage="heavy",
+        rig=MODEST_RIG,
+        seed=5,
+    ),
+    Case(
+        "heavy-6",
+        "heavy damage, modest rig, drawn anew: a fracture as sharp as a wall",
+        damage="heavy",
+        rig=MODEST_RIG,
+        seed=6,
+    ),
     Case("warp", "base, warped by 4 µm, focus drifting by 2 µm", rig=Rig(warp_m=4e-6, focus_drift_m=2e-6)),
     Case("uneven", "base, steps uneven by 8 %, groups off by 3 µm", rig=Rig(0.08, 3e-6)),
     Case(
@@ -189,7 +206,7 @@ def _read(name: str, start_s: float, seconds: float) -> tuple[FloatArray, float]
 
 def scene_of(case: Case, *, height_px: int = 512) -> Scene:
     """Return the scene of a case, in a picture of so many rows."""
-    scene = named_scene(_bench_of(case, height_px), texture=case.texture, damage=case.damage)
+    scene = named_scene(_bench_of(case, height_px), texture=case.texture, damage=case.damage, seed=case.seed)
     texture = replace(scene.texture, contrast=scene.texture.contrast * case.contrast)
     if case.skewness is not None:
         texture = replace(texture, skewness=case.skewness)
