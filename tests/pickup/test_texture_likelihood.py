@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from gramoscope.apparatus.bench import Bench, Sequence
+from gramoscope.conventions import INNER, OUTER
 from gramoscope.errors import ArgumentError
 from gramoscope.pickup.overlay import TILE_COLUMNS, TILE_ROWS
+from gramoscope.pickup.processor import PROCESSOR
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.reading import Evidence
 from gramoscope.pickup.texture.sharpness import sharpness
@@ -20,6 +22,7 @@ from gramoscope.pickup.texture_likelihood import (
     TextureLikelihood,
     TexturePickup,
     samples_of,
+    sight_of,
     tiles_to_draw,
     worth_reading,
 )
@@ -177,6 +180,21 @@ def test_a_passage_too_short_to_learn_from_is_lost_and_says_why(cartridge: Textu
     assert pickup.sketch(_blank(1, 90)) is None
     assert pickup.calibration["groups"] == 3
     assert trace.arc_start_m == pytest.approx(470e-6 + 3.5 * 0.390625e-6)
+
+
+def test_a_wall_that_went_astray_goes_along_with_the_other_and_is_not_read(cartridge: TextureLikelihood) -> None:
+    pickup = TexturePickup(cartridge, StripeLayout.of_bench(cartridge.bench, edge_margin_px=-16.0))
+    film = PROCESSOR.film(_blank(0, 90))
+    cells = 160
+    path, support = np.zeros((2, cells)), np.ones((pickup.layout.wall.size, cells))
+    path[OUTER, 60:90], support[pickup.layout.wall == OUTER] = 14.0, 0.7
+    stretch, _ = pickup.stretch(film, sight_of(film), (path, support))
+    begun, astray = stretch.first_column, slice(60 * 8, 90 * 8)
+    there = slice(astray.start - begun, astray.stop - begun)
+    read = stretch.support[:, there].max(axis=1) > 0
+    np.testing.assert_array_equal(read, pickup.layout.wall == INNER)
+    assert np.abs(stretch.displacement_px[:, there]).max() < 1.0
+    assert stretch.support[:, : there.start - 60].min() > 0.6
 
 
 @pytest.mark.parametrize(("grey", "valid", "flag"), [(0.0, True, Quality.DARK), (90.0, False, Quality.FRAME_LOST)])
