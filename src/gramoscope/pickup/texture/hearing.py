@@ -314,7 +314,7 @@ def heard(
     clear : bool array, shape (stripe, column)
         Where to listen, see `clear_columns`.
     power_limits : (float, float)
-        Of the texture, in units of its usual power.
+        The least of the texture and the most of anything, in units of their usual power.
 
     Returns
     -------

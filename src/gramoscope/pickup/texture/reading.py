@@ -117,7 +117,7 @@ class Rules:
     Parameters
     ----------
     power_limits : (float, float)
-        Columns with less or more texture than so many times the usual are damaged.
+        Columns with less of the texture, or more of anything, than so many times the usual are damaged.
     least_support : float
         Sharpness, of a typical sharp row, below which a stripe is not there.
     smooth_px : float
