@@ -1,10 +1,10 @@
-"""Ctrl-C at the wrong moment: between a file that was made and the note that it has to go again."""
+"""Ctrl-C at the wrong moment: between a file and the note that it has to go again, or within a library that loses it."""
 
 from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -33,10 +33,29 @@ def ctrl_c_waits() -> Iterator[None]:
         handler(*came[0])
 
 
-def was_ctrl_c(error: BaseException | None) -> bool:
-    """Tell whether Ctrl-C is behind an error: libraries that are stopped while they load hide it behind others."""
-    while error is not None:
-        if isinstance(error, KeyboardInterrupt):
-            return True
-        error = error.__cause__ or error.__context__
-    return False
+@contextmanager
+def ctrl_c_noted() -> Iterator[Callable[[], bool]]:
+    """Note in the block that Ctrl-C came, for libraries lose it: stopped at the wrong moment, they raise errors of their own.
+
+    On other threads than the main one, which Ctrl-C never reaches, and where nobody listens to it, nothing happens.
+
+    Yields
+    ------
+    callable
+        Tells whether Ctrl-C came since the block began.
+    """
+    came: list[tuple[Any, ...]] = []
+    handler = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(handler):
+        yield lambda: False
+        return
+
+    def note(*what: Any) -> None:
+        came.append(what)
+        handler(*what)
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield lambda: bool(came)
+    finally:
+        signal.signal(signal.SIGINT, handler)

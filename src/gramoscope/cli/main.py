@@ -24,7 +24,7 @@ from gramoscope.cli.recipe import recipe
 from gramoscope.cli.terminal import BAD_INPUT, FINE, INTERRUPTED, show_error
 from gramoscope.cli.unroll import unroll
 from gramoscope.errors import GramoscopeError
-from gramoscope.interruption import was_ctrl_c
+from gramoscope.interruption import ctrl_c_noted
 
 app = cyclopts.App(
     name="gramoscope",
@@ -66,41 +66,41 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         Exit code, see `gramoscope.cli.terminal`.
     """
-    try:
-        return _told(arguments)
-    except BaseException as error:
-        if not was_ctrl_c(error):
-            raise
-        if arguments is None:
-            # libraries that were stopped half-way complain while the interpreter tidies up: nobody can use that
-            sys.unraisablehook = lambda _: None
-        sys.stderr.write("\nStopped. No half-written file was left.\n")
-        return INTERRUPTED
-
-
-def _told(arguments: Sequence[str] | None) -> int:
-    """Run a command line and tell people what went wrong, if it did."""
-    try:
-        result = app(arguments if arguments is None else list(arguments), exit_on_error=False)
-        sys.stdout.flush()
-    except cyclopts.CycloptsError:
-        return BAD_INPUT
-    except BrokenPipeError:
-        _write_no_more()
-        return FINE
-    except OSError as error:
-        _write_no_more()
-        show_error(_of_the_system(error))
-        return BAD_INPUT
-    except GramoscopeError as error:
-        show_error(error)
-        return BAD_INPUT
-    except MemoryError:
-        show_error(
-            GramoscopeError("there is not enough memory", "less at a time", "fewer --workers, or a lower --rate")
-        )
-        return BAD_INPUT
+    with ctrl_c_noted() as stopped:
+        try:
+            result = app(arguments if arguments is None else list(arguments), exit_on_error=False)
+            sys.stdout.flush()
+        except BaseException as error:
+            if not (stopped() or isinstance(error, KeyboardInterrupt)):
+                return _told(error)
+            if arguments is None:
+                # libraries that were stopped half-way complain while the interpreter tidies up: nobody can use that
+                sys.unraisablehook = lambda _: None
+            sys.stderr.write("\nStopped. No half-written file was left.\n")
+            return INTERRUPTED
     return result if isinstance(result, int) else FINE
+
+
+def _told(error: BaseException) -> int:
+    """Tell people what went wrong; a defect is theirs who wrote this."""
+    match error:
+        case cyclopts.CycloptsError():
+            pass  # told by the one who raised it
+        case BrokenPipeError():
+            _write_no_more()
+            return FINE
+        case OSError():
+            _write_no_more()
+            show_error(_of_the_system(error))
+        case GramoscopeError():
+            show_error(error)
+        case MemoryError():
+            show_error(
+                GramoscopeError("there is not enough memory", "less at a time", "fewer --workers, or a lower --rate")
+            )
+        case _:
+            raise error
+    return BAD_INPUT
 
 
 def _write_no_more() -> None:
