@@ -61,7 +61,7 @@ def _bank(filters: np.ndarray, sign: np.ndarray) -> FilterBank:
 
 def _all_filters(form: FloatArray, spectra: FloatArray) -> FilterBank:
     """As many of either sign as there are rows: also those that say nothing."""
-    filters, sign = strongest_filters(form, spectra, 2 * form.shape[1])
+    filters, sign = strongest_filters(form, spectra, root(spectra), 2 * form.shape[1])
     return _bank(filters, sign)
 
 
@@ -191,7 +191,7 @@ def _known_form(rng: np.random.Generator, strength: FloatArray) -> tuple[np.ndar
 def test_the_filters_that_are_kept_are_the_loudest_of_each_sign(count: int) -> None:
     strength = np.array([-5.0, -3.0, -2.0, -0.4, 0.3, 1.0, 4.0, 6.0])
     form, spectra = _known_form(np.random.default_rng(8), strength)
-    filters, sign = strongest_filters(form, spectra, count)
+    filters, sign = strongest_filters(form, spectra, root(spectra), count)
     assert filters.shape == (BINS, count, 8)
     np.testing.assert_array_equal(sign, np.repeat([-1.0, 1.0], count // 2))
     power = np.linalg.eigvalsh(filters @ spectra @ filters.transpose(0, 2, 1))
@@ -206,12 +206,12 @@ def test_the_filters_that_are_kept_are_the_loudest_of_each_sign(count: int) -> N
 
 def test_a_form_of_one_sign_has_no_filters_of_the_other() -> None:
     form, spectra = _known_form(np.random.default_rng(9), np.array([0.0, 0.0, 0.5, 2.0, 3.0]))
-    filters, sign = strongest_filters(form, spectra, 4)
+    filters, sign = strongest_filters(form, spectra, root(spectra), 4)
     assert (filters[:, sign < 0] == 0).all()
     lower = np.linalg.cholesky(spectra[0])
     said = np.linalg.eigvalsh(lower.T @ _energies(filters, sign)[0] @ lower)
     np.testing.assert_allclose(said, [0.0, 0.0, 0.0, 2.0, 3.0], atol=1e-6)
-    nothing, _ = strongest_filters(0 * form, spectra, 4)
+    nothing, _ = strongest_filters(0 * form, spectra, root(spectra), 4)
     assert (nothing == 0).all()
 
 
@@ -234,7 +234,7 @@ def test_filters_of_neighbouring_frequencies_are_alike_even_where_the_loudest_ch
     turn = _turned(0.9 * share)
     form = turn @ (strength[:, :, None] * turn.transpose(0, 2, 1))
     spectra = _smooth(np.stack([np.eye(6), np.diag([1.2, 1.0, 0.9, 1.0, 1.1, 1.0])]))
-    filters, sign = strongest_filters(form, spectra, 4)
+    filters, sign = strongest_filters(form, spectra, root(spectra), 4)
     steps = np.linalg.norm(np.diff(filters, axis=0), axis=(1, 2))
     # as far as each filter goes from end to end: two turn by 0.9, and change their loudness
     assert steps.max() < 3 / BINS * np.linalg.norm(filters[0])
@@ -252,7 +252,8 @@ def test_more_energy_in_a_positive_filter_asks_for_a_higher_row() -> None:
     rising = np.exp(-0.5 * (rows - 4.5) ** 2)
     falling = rising[::-1]
     form = np.broadcast_to(np.outer(rising, rising) - np.outer(falling, falling), (BINS, 7, 7))
-    filters, sign = strongest_filters(form, np.broadcast_to(np.eye(7), form.shape), 2)
+    one = np.broadcast_to(np.eye(7), form.shape)
+    filters, sign = strongest_filters(form, one, one, 2)
     noise = np.random.default_rng(11).normal(size=(LENGTH, 1))
     for middle, asked in ((4.5, 1), (1.5, -1)):
         window = (noise * np.exp(-0.5 * (rows - middle) ** 2)).astype(np.float32)
@@ -264,7 +265,7 @@ def test_channels_lose_nothing_of_a_form_that_lies_in_them() -> None:
     rng = np.random.default_rng(12)
     basis = rng.normal(size=(9, 4))
     inside, spectra = _smooth(_symmetric(rng, 2, 4)), _smooth(_positive(rng, 2, 9))
-    form, seen = through_channels(basis @ inside @ basis.T, spectra, basis)
+    (form,), seen = through_channels((basis @ inside @ basis.T,), spectra, basis)
     np.testing.assert_allclose(seen, basis.T @ spectra @ basis, atol=1e-9)
     np.testing.assert_allclose(form, inside, atol=1e-9 * np.abs(inside).max())
 
@@ -276,7 +277,7 @@ def test_what_channels_do_not_show_is_what_they_lead_to_expect() -> None:
     z = basis.T @ x
     fit, *_ = np.linalg.lstsq(z.T, x.T)
     expected = fit.T @ z
-    through, _ = through_channels(form, (x @ x.T)[np.newaxis], basis)
+    (through,), _ = through_channels((form,), (x @ x.T)[np.newaxis], basis)
     said = np.einsum("is,ij,js->s", expected, form[0], expected)
     np.testing.assert_allclose(np.einsum("is,ij,js->s", z, through[0], z), said, atol=1e-6 * said.std())
 
@@ -306,7 +307,7 @@ def test_common_channels_show_all_of_forms_that_need_no_more() -> None:
     basis = common_channels(forms, spectra, patterns, 6)
     np.testing.assert_allclose(_within(basis, np.hstack(looks)), 1, atol=1e-6)
     for form in forms:
-        through, _ = through_channels(form, spectra, basis)
+        (through,), _ = through_channels((form,), spectra, basis)
         np.testing.assert_allclose(basis @ through @ basis.T, form, atol=1e-6 * np.abs(form).max())
 
 
@@ -435,7 +436,7 @@ def test_where_nothing_was_seen_filters_say_nothing_and_nothing_fails() -> None:
     nothing = np.zeros((5, WIDE, WIDE))
     patterns = strongest_patterns(nothing[0], 2)
     basis = common_channels((nothing, nothing), nothing, patterns, 6)
-    form, seen = through_channels(nothing, nothing, basis)
-    filters, _ = strongest_filters(form, seen, 4)
+    (form,), seen = through_channels((nothing,), nothing, basis)
+    filters, _ = strongest_filters(form, seen, root(seen), 4)
     np.testing.assert_array_equal(filters, 0)
     assert np.isfinite(usual_power(nothing[0], basis, INNER)).all()

@@ -12,7 +12,7 @@ import pytest
 from scipy import fft, ndimage
 
 from gramoscope.pickup.texture import likelihood
-from gramoscope.pickup.texture.filter_bank import FilterBank, strongest_filters, witness_forms
+from gramoscope.pickup.texture.filter_bank import FilterBank, root, strongest_filters, witness_forms
 from gramoscope.pickup.texture.following import REACH, follow, wide_rows
 from gramoscope.pickup.texture.likelihood import (
     QUIET_BAND,
@@ -79,7 +79,7 @@ class Known:
 def _bank(form: np.ndarray, spectra: np.ndarray) -> tuple[FilterBank, float]:
     """All that a form has to say, of loudness 1, and how loud it was."""
     rows = form.shape[1]
-    filters, sign = strongest_filters(form, spectra, rows - 1)
+    filters, sign = strongest_filters(form, spectra, root(spectra), rows - 1)
     np.testing.assert_allclose(
         np.einsum("k,fki,fkj->fij", sign, filters, filters), form, atol=1e-6 * np.abs(form).max(), err_msg="all of it"
     )

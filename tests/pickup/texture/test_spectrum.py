@@ -11,8 +11,10 @@ from gramoscope.pickup.texture.likelihood import softened
 from gramoscope.pickup.texture.spectrum import (
     Band,
     CrossSpectra,
+    LagSums,
     filtered,
     precision,
+    square,
     whitening_filter,
 )
 
@@ -21,6 +23,7 @@ LENGTH = 1024
 WIDTH = 700
 LAG_PX = 80
 SMOOTH_BINS = 16.0
+FREQUENCY = np.arange(LENGTH // 2 + 1) / LENGTH
 # symmetric, as a groove has no preferred direction: the cross-spectra are real
 FILTERS = np.array([[0.1, 0.5, 1.0, 0.5, 0.1], [-0.3, 0.2, 0.8, 0.2, -0.3], [0.0, -0.4, 0.9, -0.4, 0.0]])
 
@@ -45,15 +48,15 @@ def _weight(rng: np.random.Generator, width: int = WIDTH) -> np.ndarray:
     return softened(valid)
 
 
-def _summed(rng: np.random.Generator, windows: int) -> CrossSpectra:
+def _summed(rng: np.random.Generator, windows: int) -> LagSums:
     total = CrossSpectra(3, LENGTH)
     for _ in range(windows):
         total.see(_rows(rng), _weight(rng))
-    return total
+    return total.lags(LAG_PX)
 
 
 def test_known_cross_spectra_are_found_without_bias_whatever_is_missing() -> None:
-    found = _summed(np.random.default_rng(8), 300).spectra(largest_lag_px=LAG_PX, length=LENGTH)
+    found = _summed(np.random.default_rng(8), 300).spectra(FREQUENCY, largest_lag_px=LAG_PX)
     true = _true_spectra(LENGTH)
     scale = np.sqrt(np.einsum("fi,fj->fij", *(2 * [np.diagonal(true, axis1=1, axis2=2)])))
     error = (found - true) / scale
@@ -75,30 +78,62 @@ def test_columns_are_counted_by_the_square_of_their_weight() -> None:
         weight = 0.7 * _weight(rng)
         count += float((weight.astype(np.float64) ** 2).sum())
         total.see(_rows(rng), weight)
-    assert total.columns == pytest.approx(count, rel=1e-6)
+    assert total.lags(LAG_PX).columns == pytest.approx(count, rel=1e-6)
 
 
 def test_the_error_falls_as_the_root_of_the_columns() -> None:
     rng = np.random.default_rng(5)
     true = _true_spectra(LENGTH)
     few, many = (
-        np.mean([(_summed(rng, n).spectra(largest_lag_px=LAG_PX, length=LENGTH) - true).std() for _ in range(6)])
+        np.mean([(_summed(rng, n).spectra(FREQUENCY, largest_lag_px=LAG_PX) - true).std() for _ in range(6)])
         for n in (4, 64)
     )
     assert few / many == pytest.approx(4, rel=0.2)
 
 
-def test_the_answer_comes_in_the_bins_of_any_transform() -> None:
-    total = _summed(np.random.default_rng(2), 20)
-    fine, coarse = (total.spectra(largest_lag_px=LAG_PX, length=n) for n in (1024, 256))
-    np.testing.assert_allclose(fine[::4], coarse, atol=1e-6 * np.abs(coarse).max())
+def test_what_lies_a_lag_apart_is_summed_as_it_stands() -> None:
+    rng, total = np.random.default_rng(2), CrossSpectra(3, LENGTH)
+    rows, weight = _rows(rng), _weight(rng)
+    total.see(rows, weight)
+    found = total.lags(LAG_PX)
+    shown = rows.astype(np.float64) * weight[:, None]
+    for lag in (0, 1, 17, LAG_PX):
+        onward = shown[: WIDTH - lag].T @ shown[lag:]
+        # a groove has no direction along itself: both ways count
+        expected = (onward + onward.T) / 2
+        np.testing.assert_allclose(square(found.product, 3)[lag], expected, atol=1e-4 * np.abs(expected).max() + 1e-3)
+        assert found.weight[lag] == pytest.approx(weight[: WIDTH - lag].astype(np.float64) @ weight[lag:], rel=1e-5)
 
 
-def test_a_transform_that_cannot_hold_all_lags_is_refused() -> None:
+def test_sums_of_windows_add_up_before_and_after_they_are_lags() -> None:
+    rng = np.random.default_rng(3)
+    one, other = CrossSpectra(3, LENGTH), CrossSpectra(3, LENGTH)
+    for total in (one, other):
+        total.see(_rows(rng), _weight(rng))
+    after = one.lags(LAG_PX) + other.lags(LAG_PX)
+    one.add(other)
+    before = one.lags(LAG_PX)
+    np.testing.assert_allclose(before.product, after.product, rtol=1e-9, atol=1e-9 * np.abs(after.product).max())
+    np.testing.assert_allclose(before.weight, after.weight, rtol=1e-9)
+
+
+@pytest.mark.parametrize("length", [1024, 1025])
+def test_lags_do_not_depend_on_the_transform_that_they_were_summed_by(length: int) -> None:
+    rng = np.random.default_rng(2)
+    rows, weight = _rows(rng), _weight(rng)
+    found = []
+    for n in (900, length):
+        total = CrossSpectra(3, n)
+        total.see(rows, weight)
+        found.append(total.lags(LAG_PX))
+    np.testing.assert_allclose(found[0].product, found[1].product, atol=1e-5 * np.abs(found[0].product).max())
+    np.testing.assert_allclose(found[0].weight, found[1].weight, rtol=1e-5)
+
+
+def test_lags_that_were_not_summed_are_refused() -> None:
     total = _summed(np.random.default_rng(2), 1)
-    assert np.isfinite(total.spectra(largest_lag_px=LAG_PX, length=2 * LAG_PX + 1)).all()
-    with pytest.raises(ArgumentError, match="160 for lags up to 80"):
-        total.spectra(largest_lag_px=LAG_PX, length=2 * LAG_PX)
+    with pytest.raises(ArgumentError, match="no more than the 80"):
+        total.spectra(FREQUENCY, largest_lag_px=LAG_PX + 1)
 
 
 @pytest.mark.parametrize(("lag", "share"), [(0, 1.0), (20, 1.0), (40, 1.0), (60, 0.5), (80, 0.0), (100, 0.0)])
@@ -108,7 +143,7 @@ def test_lags_count_fully_up_to_half_the_window_and_not_beyond_it(lag: int, shar
     weight = np.ones(WIDTH, np.float32)
     sums = CrossSpectra(rows.shape[1], LENGTH)
     sums.see(rows, weight)
-    found = sums.spectra(largest_lag_px=LAG_PX, length=LENGTH)
+    found = sums.lags(LAG_PX).spectra(FREQUENCY, largest_lag_px=LAG_PX)
     assert fft.irfft(found[:, 0, 0], LENGTH)[lag] * (WIDTH - lag) == pytest.approx(share, abs=0.04)
 
 
@@ -157,19 +192,18 @@ def _covariance(values: np.ndarray, seed: int = 1) -> np.ndarray:
 
 def test_the_precision_of_a_safe_matrix_is_its_inverse() -> None:
     c = _covariance(np.array([2.0, 2.0, 2.0, 3.0, 50.0, 7.0, 11.0, 4.0, 900.0]))
-    inverse, noise = precision(c, band=slice(5, 30), loading=0.0, smooth_bins=SMOOTH_BINS)
-    assert inverse.shape == (25, 9, 9)
-    np.testing.assert_allclose(inverse @ c[5:30], np.broadcast_to(np.eye(9), (25, 9, 9)), atol=1e-3)
+    inverse, noise = precision(c, loading=0.0, smooth_bins=SMOOTH_BINS)
+    np.testing.assert_allclose(inverse @ c, np.broadcast_to(np.eye(9), c.shape), atol=1e-3)
     np.testing.assert_allclose(noise, 2.0, rtol=1e-5)
 
 
 def test_what_the_sample_could_not_tell_is_never_below_the_noise() -> None:
     inverse, noise = precision(
-        _covariance(np.array([1e-9, 0.0, 6.0, 7.0, 8.0, 9.0])), band=slice(0, 40), loading=0.0, smooth_bins=SMOOTH_BINS
+        _covariance(np.array([1e-9, 0.0, 6.0, 7.0, 8.0, 9.0])), loading=0.0, smooth_bins=SMOOTH_BINS
     )
     assert np.linalg.eigvalsh(inverse)[:, -1] == pytest.approx(1 / noise[0], rel=1e-3)
     lucky, noise = precision(
-        _covariance(np.array([0.1, 1.9, 6.0, 7.0, 8.0, 9.0])), band=slice(0, 40), loading=0.0, smooth_bins=SMOOTH_BINS
+        _covariance(np.array([0.1, 1.9, 6.0, 7.0, 8.0, 9.0])), loading=0.0, smooth_bins=SMOOTH_BINS
     )
     assert noise == pytest.approx(1.0, rel=1e-5)
     assert np.linalg.eigvalsh(lucky)[:, -1] == pytest.approx(1.0, rel=1e-4)
@@ -178,13 +212,13 @@ def test_what_the_sample_could_not_tell_is_never_below_the_noise() -> None:
 def test_a_single_unlucky_bin_leans_on_its_neighbours() -> None:
     c = _covariance(np.array([1.0, 1.0, 3.0, 4.0, 5.0, 6.0])).copy()
     c[20] = _covariance(np.array([1e-6, 1e-6, 3.0, 4.0, 5.0, 6.0]))[0]
-    inverse, _ = precision(c, band=slice(0, 40), loading=0.0, smooth_bins=SMOOTH_BINS)
+    inverse, _ = precision(c, loading=0.0, smooth_bins=SMOOTH_BINS)
     assert np.linalg.eigvalsh(inverse[20])[-1] < 1.1
 
 
 def test_loading_adds_a_share_of_the_mean_power_to_every_direction() -> None:
     values = np.array([1.0, 1.0, 1.0, 5.0, 12.0, 40.0])
-    inverse, _ = precision(_covariance(values), band=slice(0, 40), loading=0.3, smooth_bins=SMOOTH_BINS)
+    inverse, _ = precision(_covariance(values), loading=0.3, smooth_bins=SMOOTH_BINS)
     np.testing.assert_allclose(np.sort(1 / np.linalg.eigvalsh(inverse[7])), values + 0.3 * 10, rtol=1e-4)
 
 

@@ -18,6 +18,8 @@ products of different frequencies, of which everything that changes along the gr
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import accumulate
+from operator import matmul
 
 import numba
 import numpy as np
@@ -273,27 +275,34 @@ def common_channels(forms: tuple[FloatArray, ...], spectra: FloatArray, patterns
     return np.asarray(np.linalg.solve(mean.T, orthogonal))
 
 
-def through_channels(form: FloatArray, spectra: FloatArray, basis: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return a form and the spectra as they are seen through channels.
+def through_channels(
+    forms: tuple[FloatArray, ...], spectra: FloatArray, basis: FloatArray
+) -> tuple[tuple[FloatArray, ...], FloatArray]:
+    """Return forms and the spectra as they are seen through channels.
 
     What a form says of rows is said of what the channels lead to expect of the rows, R z with R = C B (BᵀC B)⁻¹.
 
     Returns
     -------
-    float64 arrays, shape (bin, channel, channel)
+    (float64 arrays, float64 array), shape (bin, channel, channel)
     """
-    seen = basis.T @ spectra @ basis
-    expected = np.linalg.solve(_safe(seen), (spectra @ basis).transpose(0, 2, 1)).transpose(0, 2, 1)
-    return np.asarray(expected.transpose(0, 2, 1) @ form @ expected), np.asarray(seen)
+    shown = spectra @ basis
+    seen = basis.T @ shown
+    expected = np.linalg.solve(_safe(seen), shown.transpose(0, 2, 1))
+    return tuple(expected @ form @ expected.transpose(0, 2, 1) for form in forms), np.asarray(seen)
 
 
-def strongest_filters(form: FloatArray, spectra: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
+def strongest_filters(
+    form: FloatArray, spectra: FloatArray, lower: FloatArray, count: int
+) -> tuple[FloatArray, FloatArray]:
     """Return the filters whose energies make up most of a form.
 
     Parameters
     ----------
     form, spectra : float64 arrays, shape (bin, channel, channel)
         Q_f and C_f.
+    lower : float64 array, same shape
+        L with L Lᵀ = C_f; see `root`.
     count : int
         Even: half of the filters have positive energies, half negative ones.
 
@@ -304,7 +313,6 @@ def strongest_filters(form: FloatArray, spectra: FloatArray, count: int) -> tupl
     sign : float64 array, shape (filter,)
     """
     half = count // 2
-    lower = root(spectra)
     strength, vector = np.linalg.eigh(lower.transpose(0, 2, 1) @ form @ lower)
     used = np.r_[0:half, -half:0]
     strength, vector = strength[:, used], vector[:, :, used]
@@ -314,9 +322,10 @@ def strongest_filters(form: FloatArray, spectra: FloatArray, count: int) -> tupl
     scale = np.where(found, sign / np.sqrt(np.where(found, np.abs(strength), 1.0)), 0.0)
     filters = (form @ lower @ vector * scale[:, None, :]).transpose(0, 2, 1).copy()
     for side in (slice(0, half), slice(half, count)):
-        for b in range(1, len(filters)):
-            left, _, right = np.linalg.svd(filters[b - 1, side] @ spectra[b] @ filters[b, side].T)
-            filters[b, side] = left @ right @ filters[b, side]
+        # turned by V, the next is turned by V times what it would be turned by if this one were not
+        left, _, right = np.linalg.svd(filters[:-1, side] @ spectra[1:] @ filters[1:, side].transpose(0, 2, 1))
+        turns = accumulate(left @ right, matmul, initial=np.eye(half))
+        filters[:, side] = np.stack(list(turns)) @ filters[:, side]
     return filters, sign
 
 

@@ -16,13 +16,12 @@ end where the information is. All windows are therefore whitened along the groov
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numba
 import numpy as np
 from scipy import fft, ndimage
 
-from gramoscope.conventions import Float32Array, FloatArray
+from gramoscope.conventions import Float32Array, FloatArray, IntArray
 from gramoscope.errors import require
 
 WHITENER_TAPS = 41
@@ -139,6 +138,34 @@ def half_of(taps: FloatArray) -> Float32Array:
     return half_taps if half_taps.size % 2 else np.append(half_taps, np.float32(0))
 
 
+@numba.njit(cache=True, nogil=True, fastmath={"contract"})
+def _add_products(x, within):  # type: ignore[no-untyped-def]
+    """Add Re x_i x_j* of each bin, for j up to i."""
+    bins, rows = x.shape
+    real, imaginary = np.empty(rows), np.empty(rows)
+    for b in range(bins):
+        for i in range(rows):
+            real[i], imaginary[i] = x[b, i].real, x[b, i].imag
+        pair = 0
+        for i in range(rows):
+            for j in range(i + 1):
+                within[b, pair + j] += real[i] * real[j] + imaginary[i] * imaginary[j]
+            pair += i + 1
+
+
+def pair_count(rows: int) -> int:
+    """How many pairs of rows there are, each with itself included."""
+    return rows * (rows + 1) // 2
+
+
+def square(pairs: FloatArray, rows: int) -> FloatArray:
+    """Return symmetric matrices, shape (…, row, row), of their pairs of rows 00, 10, 11, 20 and so on, shape (…, pair)."""
+    number = np.empty((rows, rows), np.intp)
+    lower = np.tril_indices(rows)
+    number[lower] = number.T[lower] = np.arange(pair_count(rows))
+    return np.asarray(pairs[..., number])
+
+
 @dataclass(eq=False)
 class CrossSpectra:
     """Sums of cross-spectra over many windows.
@@ -148,6 +175,12 @@ class CrossSpectra:
     rows : int
     length : int
         Of the transforms; at least a window's width and the largest lag.
+
+    Attributes
+    ----------
+    within : float64 array, shape (bin, pair)
+        Of each pair of rows; see `square`.
+    weight : float64 array, shape (bin,)
     """
 
     rows: int
@@ -155,7 +188,7 @@ class CrossSpectra:
 
     def __post_init__(self) -> None:
         bins = self.length // 2 + 1
-        self.within: FloatArray = np.zeros((bins, self.rows, self.rows))
+        self.within: FloatArray = np.zeros((bins, pair_count(self.rows)))
         self.weight: FloatArray = np.zeros(bins)
 
     def see(self, window: Float32Array, weight: Float32Array) -> None:
@@ -168,9 +201,7 @@ class CrossSpectra:
         weight : float32 array, shape (column,)
             0 … 1, rising and falling softly.
         """
-        x = fft.rfft(window * weight[:, None], self.length, axis=0)
-        seen = np.stack([x.real, x.imag], axis=2)
-        self.within += seen @ seen.transpose(0, 2, 1)
+        _add_products(fft.rfft(window * weight[:, None], self.length, axis=0), self.within)
         self.weight += np.abs(fft.rfft(weight.astype(np.float64), self.length)) ** 2
 
     def add(self, other: CrossSpectra) -> None:
@@ -178,63 +209,77 @@ class CrossSpectra:
         self.within += other.within
         self.weight += other.weight
 
-    @cached_property
-    def _to_lag_0(self) -> FloatArray:
-        """What each bin counts in the mean over all of a real transform's."""
-        share = np.full(self.weight.size, 2 / self.length)
-        share[0] = 1 / self.length
+    def lags(self, largest_lag_px: int) -> LagSums:
+        """Return what these sums are in lags of 0 … `largest_lag_px` columns."""
+        lag = np.arange(largest_lag_px + 1)
+        back = cosines(lag, np.arange(self.weight.size) / self.length) * (2 / self.length)
+        back[:, 0] /= 2
         if self.length % 2 == 0:
-            share[-1] = 1 / self.length
-        return share
+            back[:, -1] /= 2
+        return LagSums(self.rows, back @ self.within, back @ self.weight)
+
+
+def cosines(lag: IntArray, frequency: FloatArray) -> FloatArray:
+    """Return cos 2πfτ, shape (lag, frequency): what a Fourier transform of symmetric sequences is made of."""
+    return np.asarray(np.cos(2 * np.pi * np.outer(lag, frequency)))
+
+
+@dataclass(frozen=True, eq=False)
+class LagSums:
+    """Sums over many windows of the products of what lies so many columns apart.
+
+    Attributes
+    ----------
+    rows : int
+    product : float64 array, shape (lag, pair)
+        Of each pair of rows; see `square`.
+    weight : float64 array, shape (lag,)
+        Of how many columns, each counted by its weight.
+    """
+
+    rows: int
+    product: FloatArray
+    weight: FloatArray
+
+    def __add__(self, other: LagSums) -> LagSums:
+        return LagSums(self.rows, self.product + other.product, self.weight + other.weight)
 
     @property
     def columns(self) -> float:
         """How many columns were summed over, each counted by the square of its weight."""
-        return float(self._to_lag_0 @ self.weight)
+        return float(self.weight[0])
 
     @property
     def covariance(self) -> FloatArray:
         """Of the rows in one column, shape (row, row)."""
-        return np.asarray(np.tensordot(self._to_lag_0, self.within, 1) / max(self.columns, 1.0))
+        return square(self.product[0] / max(self.columns, 1.0), self.rows)
 
-    def lags(self, largest_lag_px: int) -> FloatArray:
-        """Return the covariance of the rows of columns 0 … `largest_lag_px` apart, shape (lag, row, row)."""
-        columns = np.maximum(fft.irfft(self.weight, self.length)[: largest_lag_px + 1], 1.0)
-        return np.asarray(fft.irfft(self.within, self.length, axis=0)[: columns.size] / columns[:, None, None])
+    def spectra(self, frequency: FloatArray, *, largest_lag_px: int) -> FloatArray:
+        """Return C_f.
 
-    def spectra(self, *, largest_lag_px: int, length: int) -> FloatArray:
-        """Return C_f; see `spectra_of`."""
-        return spectra_of(self.lags(largest_lag_px), length=length)
+        Parameters
+        ----------
+        frequency : float64 array, shape (bin,)
+            Cycles a pixel.
+        largest_lag_px : int
+            No more than there are. The lag window is 1 to half of it and falls to zero as a cosine.
 
-
-def spectra_of(lags: FloatArray, *, length: int) -> FloatArray:
-    """Return C_f.
-
-    Parameters
-    ----------
-    lags : float64 array, shape (lag, row, row)
-        Covariances of rows so many columns apart, from 0 on. The lag window is 1 to half of the largest and falls to zero as
-        a cosine.
-    length : int
-        Of the transform in whose bins the answer is wanted, more than twice the largest lag.
-
-    Returns
-    -------
-    float64 array, shape (length // 2 + 1, row, row)
-    """
-    largest = len(lags) - 1
-    require(length > 2 * largest, f"a transform of {length} for lags up to {largest}", "more than twice it")
-    u = np.arange(largest + 1) / (largest + 1)
-    taper = np.where(u < 0.5, 1.0, 0.5 * (1 + np.cos(2 * np.pi * (u - 0.5))))
-    covariance = lags * taper[:, None, None]
-    full = np.zeros((length, *lags.shape[1:]))
-    full[: u.size] = covariance
-    full[-u.size + 1 :] = covariance[1:][::-1]
-    return np.asarray(fft.rfft(full, axis=0).real)
+        Returns
+        -------
+        float64 array, shape (bin, row, row)
+        """
+        known = self.weight.size - 1
+        require(largest_lag_px <= known, f"lags up to {largest_lag_px}", f"no more than the {known} that were summed")
+        lag = np.arange(largest_lag_px + 1)
+        u = lag / (largest_lag_px + 1)
+        taper = np.where(u < 0.5, 1.0, 0.5 * (1 + np.cos(2 * np.pi * (u - 0.5))))
+        both = np.where(lag == 0, 1.0, 2.0)
+        share = both * taper / np.maximum(self.weight[: lag.size], 1.0)
+        return square((cosines(lag, frequency) * share[:, None]).T @ self.product[: lag.size], self.rows)
 
 
-def precision(c: FloatArray, *, band: slice, loading: float, smooth_bins: float) -> tuple[FloatArray, FloatArray]:
-    """Return the inverse of C_f in a band, safe against what the sample could not tell.
+def precision(c: FloatArray, *, loading: float, smooth_bins: float) -> tuple[FloatArray, FloatArray]:
+    """Return the inverse of C_f, safe against what the sample could not tell.
 
     The least third of the eigenvalues of each C_f is noise; none is allowed below their mean (smoothed along f), and
     `loading` times the mean of all is added to each: much of it makes a reader that is less exact and forgives more.
@@ -242,8 +287,6 @@ def precision(c: FloatArray, *, band: slice, loading: float, smooth_bins: float)
     Parameters
     ----------
     c : float64 array, shape (bin, row, row)
-    band : slice
-        Bins to invert.
     loading : float
         Zero or more.
     smooth_bins : float
@@ -251,14 +294,14 @@ def precision(c: FloatArray, *, band: slice, loading: float, smooth_bins: float)
 
     Returns
     -------
-    inverse : float64 array, shape (bin in the band, row, row)
-    noise : float64 array, shape (bin in the band,)
+    inverse : float64 array, shape (bin, row, row)
+    noise : float64 array, shape (bin,)
         What the least eigenvalues have.
     """
-    value, vector = np.linalg.eigh(c[band])
+    value, vector = np.linalg.eigh(c)
     rows = c.shape[1]
     least = np.maximum(value[:, : rows // 3].mean(axis=1), 1e-12 * value[:, -1])
     floor = ndimage.gaussian_filter1d(least, smooth_bins, mode="nearest")
-    value = np.maximum(value, floor[:, None]) + loading * np.trace(c[band], axis1=1, axis2=2)[:, None] / rows
+    value = np.maximum(value, floor[:, None]) + loading * np.trace(c, axis1=1, axis2=2)[:, None] / rows
     inverse = (vector / value[:, None, :]) @ vector.transpose(0, 2, 1)
     return inverse, floor

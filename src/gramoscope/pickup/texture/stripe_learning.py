@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property, reduce
+from operator import add
 
 import numpy as np
-from scipy import fft
 
 from gramoscope.conventions import BoolArray, FloatArray, IntArray
 from gramoscope.errors import require
@@ -20,6 +21,7 @@ from gramoscope.pickup.texture.filter_bank import (
     FilterBank,
     common_channels,
     interpolated,
+    root,
     row_weights,
     strongest_filters,
     strongest_patterns,
@@ -38,7 +40,7 @@ from gramoscope.pickup.texture.likelihood import (
     softened,
 )
 from gramoscope.pickup.texture.reading import Model, Rules
-from gramoscope.pickup.texture.spectrum import CrossSpectra, precision, spectra_of
+from gramoscope.pickup.texture.spectrum import Band, CrossSpectra, LagSums, precision
 from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.pickup.texture.vector_lanes import LANES
 
@@ -89,8 +91,8 @@ class StripeMaterial:
         )
         return rows[0], clear[0]
 
-    def sums(self, before: StripeStatistics | None) -> list[CrossSpectra]:
-        """Return the cross-spectra of all stretches without each fold, and of all of them."""
+    def sums(self, before: StripeStatistics | None, largest_lag_px: int) -> list[LagSums]:
+        """Return what all stretches without those of each fold come to, up to a largest lag, and all of them."""
         rows = wide_rows(self.model.half_px)
 
         def summed(some: Sequence[Stretch]) -> CrossSpectra:
@@ -103,12 +105,8 @@ class StripeMaterial:
         of_fold = [CrossSpectra(rows, self.model.length) for _ in range(self.folds)]
         for one, (k, _) in zip(self.spread(summed, [some for _, some in parts]), parts, strict=True):
             of_fold[k].add(one)
-        totals = [CrossSpectra(rows, self.model.length) for _ in range(self.folds + 1)]
-        for left, total in enumerate(totals):
-            for k, one in enumerate(of_fold):
-                if k != left:
-                    total.add(one)
-        return totals
+        lags = list(self.spread(lambda one: one.lags(largest_lag_px), of_fold))
+        return [reduce(add, lags[:left] + lags[left + 1 :]) for left in range(self.folds)] + [reduce(add, lags)]
 
     def _of_fold(self, number: int) -> list[Stretch]:
         return [stretch for stretch, k in zip(self.stretches, self.fold, strict=True) if k == number]
@@ -196,8 +194,13 @@ class Forms:
 
     def through(self, basis: FloatArray) -> Forms:
         """Return what they say of channels, shape (row, channel)."""
-        (first, spectra), (second, _) = (through_channels(form, self.spectra, basis) for form in self.witnesses)
+        (first, second), spectra = through_channels(self.witnesses, self.spectra, basis)
         return Forms((first, second), spectra, self.length)
+
+    @cached_property
+    def root(self) -> FloatArray:
+        """L with L Lᵀ = C_f."""
+        return root(self.spectra)
 
     def loudness(self, filters: FloatArray) -> float:
         """Return Σ p² of filters of this window in the mean of all columns."""
@@ -245,7 +248,7 @@ class StripeLearning:
     @property
     def length(self) -> int:
         """Of a transform whose bins spectra that are cut off at the largest lag can just tell apart."""
-        return int(fft.next_fast_len(2 * self.largest_lag_px + 2, real=True))
+        return 2 * self.largest_lag_px + 2
 
     def learn(
         self, material: StripeMaterial, before: StripeStatistics | None, loading: float
@@ -265,12 +268,12 @@ class StripeLearning:
         list of StripeStatistics or None
             All None when a fold left out leaves too few columns.
         """
-        sums = material.sums(before)
+        sums = material.sums(before, max(self.largest_lag_px, self.change_lag_px))
         if min(one.columns for one in sums) < self.least_columns:
             return [None] * len(sums)
         known = list(material.spread(lambda one: self._forms(one, material.model, loading), sums))
         deaf = self._deaf(sums[-1], known[-1])
-        seen = [one.through(deaf.basis.astype(np.float64)) for one in known]
+        seen = list(material.spread(lambda one: one.through(deaf.basis.astype(np.float64)), known))
         alone = list(
             material.spread(
                 lambda one: [self._heard_by(deaf, form, one, material.model) for form in one.witnesses], seen
@@ -300,20 +303,19 @@ class StripeLearning:
             for one, bank in zip(sums, banks, strict=True)
         ]
 
-    def _forms(self, sums: CrossSpectra, model: Model, loading: float) -> Forms:
+    def _forms(self, sums: LagSums, model: Model, loading: float) -> Forms:
         """What spectra say about paths, in the bins that they can tell apart."""
-        bins = model.band.bins(self.length)
-        lags = sums.lags(max(self.largest_lag_px, self.change_lag_px))
-        wide = spectra_of(lags[: self.largest_lag_px + 1], length=self.length)
+        frequency = self._frequency(model.band, self.length)
+        wide = sums.spectra(frequency, largest_lag_px=self.largest_lag_px)
+        near = sums.spectra(frequency, largest_lag_px=self.change_lag_px)
         c = wide[:, INNER_ROWS, INNER_ROWS]
-        inverse, _ = precision(c, band=bins, loading=loading, smooth_bins=SMOOTH_CYCLES * self.length)
-        near = spectra_of(lags[: self.change_lag_px + 1], length=self.length)[bins]
+        inverse, _ = precision(c, loading=loading, smooth_bins=SMOOTH_CYCLES * self.length)
         slope = np.pad(across(c.shape[1], SHARP), ((0, 0), (REACH - SHARP.size,) * 2))
         half = slope @ near[:, :, INNER_ROWS]
         forms = witness_forms(inverse, half + half.transpose(0, 2, 1), spread_px=model.spread_px)
-        return Forms(forms, wide[bins], self.length)
+        return Forms(forms, wide, self.length)
 
-    def _deaf(self, sums: CrossSpectra, known: Forms) -> FilterBank:
+    def _deaf(self, sums: LagSums, known: Forms) -> FilterBank:
         """A bank with channels, and no filters yet."""
         patterns = np.zeros((sums.rows, self.patterns))
         patterns[INNER_ROWS] = strongest_patterns(sums.covariance[INNER_ROWS, INNER_ROWS], self.patterns)
@@ -324,8 +326,12 @@ class StripeLearning:
 
     def _heard_by(self, deaf: FilterBank, form: FloatArray, seen: Forms, model: Model) -> tuple[FilterBank, float]:
         """The bank with the strongest filters of a form, of loudness 1 together, and how loud they were."""
-        filters, sign = strongest_filters(form, seen.spectra, self.filters)
+        filters, sign = strongest_filters(form, seen.spectra, seen.root, self.filters)
         loudness = seen.loudness(filters)
-        fine, coarse = (np.arange(n // 2 + 1)[model.band.bins(n)] / n for n in (model.length, seen.length))
+        fine, coarse = (self._frequency(model.band, length) for length in (model.length, seen.length))
         filters = interpolated(filters / np.sqrt(loudness), coarse, fine)
         return replace(deaf, filters=filters.astype(np.float32), sign=sign.astype(np.float32)), loudness
+
+    def _frequency(self, band: Band, length: int) -> FloatArray:
+        """Of the bins of a transform that lie in a band, cycles a pixel."""
+        return np.arange(length // 2 + 1)[band.bins(length)] / length
