@@ -9,9 +9,10 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from gramoscope.errors import ArgumentError
-from gramoscope.player.workers import in_order
+from gramoscope.player.workers import in_order, spreading
 
 
 def _pickup_threads() -> int:
@@ -120,3 +121,14 @@ def test_a_consumer_that_stops_shuts_the_pool_down(kind: type[BaseException]) ->
 def test_no_worker_is_refused() -> None:
     with pytest.raises(ArgumentError, match="0 workers"):
         list(in_order(lambda number: number, [1], workers=0))
+
+
+def test_linear_algebra_keeps_to_one_thread_while_ours_are_at_work() -> None:
+    def threads() -> list[int]:
+        return [library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"]
+
+    with threadpool_limits(2, user_api="blas"):
+        before = threads()
+        with spreading(2) as spread:
+            assert all(set(seen) == {1} for seen in spread(lambda _: threads(), range(4)))
+        assert threads() == before

@@ -8,6 +8,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import TypeVar
 
+from threadpoolctl import threadpool_limits
+
 from gramoscope.errors import require
 from gramoscope.pickup.cartridge import Spread
 
@@ -61,6 +63,9 @@ def in_order(
 def spreading(workers: int) -> Iterator[Spread]:
     """Give a `map` that works in several threads, answers in order, while the block runs.
 
+    The linear algebra of each keeps to its own thread: two that want all processors wait for each other, and sums whose
+    order depends on how many processors there are have other bits elsewhere.
+
     Parameters
     ----------
     workers : int
@@ -69,6 +74,7 @@ def spreading(workers: int) -> Iterator[Spread]:
     require(workers >= 1, f"{workers} workers", "at least one")
     pool = ThreadPoolExecutor(workers, thread_name_prefix="learning")
     try:
-        yield pool.map
+        with threadpool_limits(1, user_api="blas"):
+            yield pool.map
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
