@@ -79,7 +79,7 @@ def reading_stages(pickup: TexturePickup, group: FrameGroup) -> list[Row]:
             seconds(lambda: read(begun, models, cut, rules)),
             0.0,
         ),
-        ("samples", seconds(lambda: samples_of(path, found)), 0.0),
+        ("samples", seconds(lambda: samples_of(path, found, pickup.cartridge.rules)), 0.0),
         ("strips for the splice", seconds(lambda: pickup.strips(laid, film)), 0.0),
         ("reading, one thread, whole", seconds(lambda: pickup.read(group)), moved),
     ]

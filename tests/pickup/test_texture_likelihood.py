@@ -13,7 +13,7 @@ from gramoscope.errors import ArgumentError
 from gramoscope.pickup.overlay import TILE_COLUMNS, TILE_ROWS
 from gramoscope.pickup.processor import PROCESSOR
 from gramoscope.pickup.texture.layout import StripeLayout
-from gramoscope.pickup.texture.reading import Evidence
+from gramoscope.pickup.texture.reading import Evidence, Rules
 from gramoscope.pickup.texture.sharpness import sharpness
 from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.pickup.texture_likelihood import (
@@ -31,6 +31,7 @@ from gramoscope.signal_path import FrameGroup
 from gramoscope.simulation.scene import filming_bench
 
 WIDTH = 203
+RULES = Rules()
 
 
 def _stretch(displacement_px: np.ndarray) -> Stretch:
@@ -46,7 +47,7 @@ def test_a_sample_is_the_mean_of_its_columns_weighted_by_what_each_knows() -> No
     rng = np.random.default_rng(2)
     path, information = rng.normal(5, 1, (2, WIDTH)), rng.uniform(0.5, 3, (2, WIDTH))
     found = _evidence(rng, information)
-    place, sigma = samples_of(_stretch(path), found)
+    place, sigma = samples_of(_stretch(path), found, RULES)
     assert place.shape == sigma.shape == (2, WIDTH // STRIDE_PX)
     each = path + found.score / information
     for sample in (0, 11, 24):
@@ -62,19 +63,40 @@ def test_error_bars_are_true_when_scores_are() -> None:
     information = rng.uniform(0.5, 3, (2, WIDTH))
     z = []
     for _ in range(60):
-        place, sigma = samples_of(_stretch(np.full((2, WIDTH), 4.0)), _evidence(rng, information))
+        place, sigma = samples_of(_stretch(np.full((2, WIDTH), 4.0)), _evidence(rng, information), RULES)
         z.append((place - 4.0) / sigma)
-    assert np.std(z) == pytest.approx(1, abs=0.04)
+    assert np.nanstd(z) == pytest.approx(1, abs=0.04)
 
 
 def test_a_wall_that_nobody_saw_has_no_place() -> None:
     information = np.ones((2, WIDTH))
     information[1] = 0
     information[0, 80:120] = 0
-    place, sigma = samples_of(_stretch(np.zeros((2, WIDTH))), _evidence(np.random.default_rng(1), information))
+    place, sigma = samples_of(_stretch(np.zeros((2, WIDTH))), _evidence(np.random.default_rng(1), information), RULES)
     np.testing.assert_array_equal(np.isnan(place[0]), (np.arange(25) >= 10) & (np.arange(25) < 15))
     assert np.isnan(place[1]).all()
     np.testing.assert_array_equal(np.isnan(place), np.isnan(sigma))
+
+
+def test_samples_whose_scores_are_no_noise_are_not_believed() -> None:
+    rng, information = np.random.default_rng(6), np.ones((2, WIDTH))
+    believed = []
+    for _ in range(60):
+        place, _ = samples_of(_stretch(np.zeros((2, WIDTH))), _evidence(rng, information), RULES)
+        believed.append(np.isfinite(place))
+    assert np.mean(believed) > 0.985
+    found = _evidence(rng, information)
+    # six samples of one wall that ask for a move of four standard errors
+    found.score[1, 80:128] += 4 / np.sqrt(STRIDE_PX)
+    place, sigma = samples_of(_stretch(np.zeros((2, WIDTH))), found, RULES)
+    assert np.isnan(place[1, 10:16]).all()
+    assert np.isfinite(place[1, :6]).all()
+    assert np.isfinite(place[1, 20:]).all()
+    assert np.isfinite(place[0]).all()
+    np.testing.assert_array_equal(np.isnan(place), np.isnan(sigma))
+    # no surprise where the whole stretch is as loud
+    place, _ = samples_of(_stretch(np.zeros((2, WIDTH))), replace(found, surprise=np.array([1.0, 9.0])), RULES)
+    assert np.isfinite(place).all()
 
 
 @pytest.mark.parametrize(
@@ -83,8 +105,8 @@ def test_a_wall_that_nobody_saw_has_no_place() -> None:
 def test_a_stretch_that_surprises_has_wider_error_bars(surprise: float, factor: float) -> None:
     usual = _evidence(np.random.default_rng(1), np.ones((2, WIDTH)))
     stretch = _stretch(np.zeros((2, WIDTH)))
-    _, sigma = samples_of(stretch, usual)
-    _, wider = samples_of(stretch, replace(usual, surprise=np.array([1.0, surprise])))
+    _, sigma = samples_of(stretch, usual, RULES)
+    _, wider = samples_of(stretch, replace(usual, surprise=np.array([1.0, surprise])), RULES)
     np.testing.assert_array_equal(wider[0], sigma[0])
     np.testing.assert_allclose(wider[1], factor * sigma[1])
 
@@ -195,6 +217,23 @@ def test_a_wall_that_went_astray_goes_along_with_the_other_and_is_not_read(cartr
     np.testing.assert_array_equal(read, pickup.layout.wall == INNER)
     assert np.abs(stretch.displacement_px[:, there]).max() < 1.0
     assert stretch.support[:, : there.start - 60].min() > 0.6
+
+
+def test_where_no_wall_is_sure_neither_is_read(cartridge: TextureLikelihood) -> None:
+    pickup = TexturePickup(cartridge, StripeLayout.of_bench(cartridge.bench, edge_margin_px=-16.0))
+    film = PROCESSOR.film(_blank(0, 90))
+    outer, (cells, sure) = pickup.layout.wall == OUTER, (160, 1.2 * cartridge.rules.least_best_support)
+    path, support = np.zeros((2, cells)), np.full((outer.size, cells), sure)
+    # both walls are faint for a while, and then one of them
+    support[:, 40:70] = support[outer, 100:130] = 0.8 * cartridge.rules.least_best_support
+    stretch, _ = pickup.stretch(film, sight_of(film), (path, support))
+    both, one = (
+        slice(first * 8 - stretch.first_column, last * 8 - stretch.first_column)
+        for first, last in ((52, 58), (112, 118))
+    )
+    assert support.min() > cartridge.rules.least_support
+    assert stretch.support[:, both].max() == 0
+    assert stretch.support[:, one].min() > cartridge.rules.least_support
 
 
 @pytest.mark.parametrize(("grey", "valid", "flag"), [(0.0, True, Quality.DARK), (90.0, False, Quality.FRAME_LOST)])

@@ -314,7 +314,9 @@ class TexturePickup:
         support = _by_column(coarse[1], x, cell, smooth_cells=SUPPORT_CELLS)
         walls = np.array([support[self.layout.wall == wall].max(axis=0, initial=0.0) for wall in (INNER, OUTER)])
         cut, rules = self.cartridge.bench.disc.cut, self.cartridge.rules
-        lost = astray(path, walls, cut, least_support=rules.least_support)
+        lost = astray(path, walls, cut, least_support=rules.least_support) | (
+            walls.max(axis=0) < rules.least_best_support
+        )
         support = np.where(lost[self.layout.wall], 0.0, support)
         path = settled(path, np.where(lost, 0.0, walls), cut, smooth_px=rules.smooth_other_px)
         rows = np.full((self.layout.wall.size, width), np.nan)
@@ -337,7 +339,7 @@ class TexturePickup:
     ) -> WallTrace:
         first = int(np.flatnonzero(group.valid)[0])
         pitch = group.pixel_pitch_m
-        place_px, sigma_px = samples_of(stretch, found)
+        place_px, sigma_px = samples_of(stretch, found, self.cartridge.rules)
         seen = np.isfinite(sigma_px)
         flags = np.where(seen, np.uint16(exposure_flags), np.uint16(exposure_flags | UNSEEN)).astype(np.uint16)
         nothing = np.full(place_px.shape, np.nan)
@@ -421,24 +423,37 @@ UNSEEN = Quality.NO_STRIPE | Quality.INTERPOLATED
 UNTAUGHT = "too little of the stripes is seen to learn their texture; the recipe seed-paper reads single groups"
 
 
-def samples_of(stretch: Stretch, found: Evidence) -> tuple[FloatArray, FloatArray]:
+def samples_of(stretch: Stretch, found: Evidence, rules: Rules) -> tuple[FloatArray, FloatArray]:
     """Return place and standard error of each wall, one sample for every 8 columns.
+
+    A path settles where its scores are zero but for their noise. Where they are not, over a few samples, something drew it
+    aside that is no wall (a scratch across both, say), and what the scores still ask for is not enough to put it right.
 
     Returns
     -------
     place_px, sigma_px : float64 arrays, shape (2, sample)
-        Displacement from rest; NaN where nothing was read.
+        Displacement from rest; NaN where nothing was read, or is not to be believed.
     """
     samples = stretch.displacement_px.shape[1] // STRIDE_PX
 
     def summed(values: FloatArray) -> FloatArray:
         return np.asarray(values[:, : samples * STRIDE_PX].reshape(2, samples, STRIDE_PX).sum(axis=2))
 
-    information = summed(found.information)
+    information, score = summed(found.information), summed(found.score)
     moment = summed(found.information * stretch.displacement_px + found.score)
-    enough = information > 1e-3 * np.max(information, axis=1, keepdims=True, initial=1e-12)
-    surprise = np.clip(np.nan_to_num(found.surprise, nan=1.0), *SURPRISE_LIMITS)
+    known = information > 1e-3 * np.max(information, axis=1, keepdims=True, initial=1e-12)
+    surprise = np.clip(np.nan_to_num(found.surprise, nan=1.0), *SURPRISE_LIMITS)[:, None]
     with np.errstate(invalid="ignore", divide="ignore"):
-        place = np.where(enough, moment / information, np.nan)
-        sigma = np.where(enough, np.sqrt(surprise[:, None] / information), np.nan)
+        local = np.where(known, score**2 / (surprise * information), 0.0)
+        seen = known & (_near(local) <= rules.most_local_surprise * _near(known.astype(np.float64)))
+        place = np.where(seen, moment / information, np.nan)
+        sigma = np.where(seen, np.sqrt(surprise / information), np.nan)
     return place, sigma
+
+
+def _near(values: FloatArray) -> FloatArray:
+    return np.asarray(ndimage.gaussian_filter1d(values, NEAR_SAMPLES, axis=1, mode="nearest"))
+
+
+NEAR_SAMPLES = 2.0
+"""Standard deviation of the bell over which scores must be what they claim: some fifty columns."""

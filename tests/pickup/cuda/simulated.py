@@ -224,8 +224,8 @@ def test_a_stretch_is_read_alike_within_a_thousandth_of_its_error() -> None:
     nothing = np.empty((0, 2), np.int64)
     there = Stretch(picture, np.ones(COLUMNS, bool), nothing, start, np.ones((2, COLUMNS)))
     here = replace(there, columns=_kept(picture), device=CARD)
-    models, rules = [_model(layout, Tone(110.0, 0.9))], Rules(power_limits=(0.0, np.inf))
-    found, found_ = (samples_of(*read(one, models, "lateral", rules)) for one in (here, there))
+    models, rules = [_model(layout, Tone(110.0, 0.9))], Rules(power_limits=(0.0, np.inf), most_local_surprise=1e9)
+    found, found_ = (samples_of(*read(one, models, "lateral", rules), rules) for one in (here, there))
     assert np.isfinite(found_[1]).all()
     assert np.abs(found_[0] - start[:, 3:-1:8][:, : found_[0].shape[1]]).max() > 0.1, "paths were moved"
     np.testing.assert_allclose(found[1], found_[1], rtol=1e-3)

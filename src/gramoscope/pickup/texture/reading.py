@@ -120,6 +120,10 @@ class Rules:
         Columns with less of the texture, or more of anything, than so many times the usual are damaged.
     least_support : float
         Sharpness, of a typical sharp row, below which a stripe is not there.
+    least_best_support : float
+        Where no wall has that much, what is sharp may be anything, as the floor of a fracture that took both: neither is read.
+    most_local_surprise : float
+        Samples about which scores have more than so many times the power that they claim are not believed.
     smooth_px : float
         Least standard deviation of the smoothing of steps in the direction of the cut.
     step_noise_px : float
@@ -136,6 +140,8 @@ class Rules:
 
     power_limits: tuple[float, float] = (0.2, 4.0)
     least_support: float = 0.15
+    least_best_support: float = 0.25
+    most_local_surprise: float = 3.0
     smooth_px: float = 12.0
     step_noise_px: float = 0.08
     smooth_other_px: float = 200.0
