@@ -1,6 +1,9 @@
-"""Play a capture again and again, each time killed at a random moment; used by `test_killed.py`, in a process of its own.
+"""Play a capture again and again, each time killed a little later; used by `test_killed.py`, in a process of its own.
 
     python killed_at_random.py CAPTURE OUT KILLS SEED
+
+The first life ends before it has read anything, the last when all is read and it draws, those between after so many groups and
+a random while.
 
 The process loads everything once and forks, so that a life costs no start. Prints how many groups each life had played.
 """
@@ -22,6 +25,7 @@ from gramoscope.player.play import Settings, play
 from gramoscope.player.reading_store import STORE
 from gramoscope.player.recipe import load_recipe
 
+PATIENCE_S = 30.0
 RECIPE = load_recipe("seed-paper")
 SETTINGS = Settings(workers=2, catalogue=Catalogue(made=datetime(2031, 2, 13, tzinfo=UTC)))
 
@@ -41,17 +45,20 @@ def main() -> int:
     # compiled code is loaded before anybody is born
     RECIPE.cartridge_for(opened.bench).learn(opened.group, 1, map).read(opened.group(0))
     moments, words, ends = random.Random(seed), out / STORE / "words" / "c", []
-    for _ in range(kills):
+
+    def groups() -> int:
+        return len(list(words.glob("*"))) if words.is_dir() else 0
+
+    for life in range(kills):
         process = lives(capture, out)
-        before = time.monotonic()
-        while time.monotonic() - before < 5 and os.waitpid(process, os.WNOHANG)[0] == 0:
+        wanted, before = opened.group_count * life // (kills - 1), time.monotonic()
+        while groups() < wanted and time.monotonic() - before < PATIENCE_S:
             time.sleep(0.002)
-            # some die before they begin, some while they read, one or two while they draw
-            if time.monotonic() - before > moments.choice((0.01, 0.1, 0.3, 0.5)) and moments.random() < 0.02:
-                os.kill(process, signal.SIGKILL)
-                os.waitpid(process, 0)
-                break
-        ends.append(len(list(words.glob("*"))) if words.is_dir() else 0)
+        time.sleep(moments.uniform(0.0, 0.03))
+        # who is done already is still to be waited for, and can be killed
+        os.kill(process, signal.SIGKILL)
+        os.waitpid(process, 0)
+        ends.append(groups())
     _, status = os.waitpid(lives(capture, out), 0)
     print(json.dumps({"ends": ends, "status": status}))
     return 0
