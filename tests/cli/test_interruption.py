@@ -103,11 +103,6 @@ def test_playing_stopped_by_ctrl_c_leaves_an_earlier_transfer_as_it_was(
     longer_capture: Path,
     quickly: tuple[str, ...],
     tmp_path: Path,
-    gramoscope: Callable[..., Any],
-    capture: Path,
-    longer_capture: Path,
-    quickly: tuple[str, ...],
-    tmp_path: Path,
 ) -> None:
     out = tmp_path / "out"
     assert gramoscope("play", capture, "--out", out, "--quiet", *quickly).code == 0
