@@ -455,5 +455,5 @@ def _near(values: FloatArray) -> FloatArray:
     return np.asarray(ndimage.gaussian_filter1d(values, NEAR_SAMPLES, axis=1, mode="nearest"))
 
 
-NEAR_SAMPLES = 2.0
-"""Standard deviation of the bell over which scores must be what they claim: some fifty columns."""
+NEAR_SAMPLES = 3.0
+"""Standard deviation of the bell over which scores must be what they claim: some eighty columns."""
