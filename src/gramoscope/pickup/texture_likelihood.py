@@ -452,7 +452,7 @@ def samples_of(stretch: Stretch, found: Evidence, rules: Rules) -> tuple[FloatAr
 
 
 def _near(values: FloatArray) -> FloatArray:
-    return np.asarray(ndimage.gaussian_filter1d(values, NEAR_SAMPLES, axis=1, mode="nearest"))
+    return np.asarray(ndimage.gaussian_filter1d(values, NEAR_SAMPLES, axis=1, mode="constant"))
 
 
 NEAR_SAMPLES = 3.0
