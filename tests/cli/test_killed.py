@@ -55,7 +55,7 @@ def _require_same(out: Path, undisturbed: Path) -> None:
 def test_a_command_killed_ten_times_makes_the_same_bits(
     longer_capture: Path, undisturbed: Path, tmp_path: Path
 ) -> None:
-    script = Path(__file__).with_name("killed_at_random.py")
+    script = Path(__file__).with_name("killed_again_and_again.py")
     command = [sys.executable, str(script), str(longer_capture), str(tmp_path / "out"), str(KILLS), "7"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr

@@ -127,6 +127,8 @@ def test_linear_algebra_keeps_to_one_thread_while_ours_are_at_work() -> None:
     def threads() -> list[int]:
         return [library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"]
 
+    if not threads():
+        pytest.skip("threads of this linear algebra cannot be counted")
     with threadpool_limits(2, user_api="blas"):
         before = threads()
         with spreading(2) as spread:

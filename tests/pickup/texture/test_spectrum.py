@@ -224,6 +224,7 @@ def test_loading_adds_a_share_of_the_mean_power_to_every_direction() -> None:
 
 def test_the_band_is_in_cycles_a_pixel() -> None:
     assert Band(0.02, 0.35).bins(1000) == slice(20, 351)
+    np.testing.assert_allclose(Band(0.02, 0.35).frequencies(1000)[[0, 1, -1]], [0.02, 0.021, 0.35], rtol=1e-12)
 
 
 @pytest.mark.parametrize("width", [1, 7, 25])

@@ -44,6 +44,10 @@ class Band:
         """Return the bins of a real Fourier transform of that length that lie in the band."""
         return slice(int(np.ceil(self.low * length)), int(np.floor(self.high * length)) + 1)
 
+    def frequencies(self, length: int) -> FloatArray:
+        """Return those of these bins, cycles a pixel."""
+        return np.arange(length // 2 + 1)[self.bins(length)] / length
+
 
 def whitening_filter(power: FloatArray, band: Band) -> FloatArray:
     """Return a symmetric filter that makes a power spectrum flat inside the band and keeps nothing outside.

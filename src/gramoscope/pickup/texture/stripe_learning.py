@@ -40,7 +40,7 @@ from gramoscope.pickup.texture.likelihood import (
     softened,
 )
 from gramoscope.pickup.texture.reading import Model, Rules
-from gramoscope.pickup.texture.spectrum import Band, CrossSpectra, LagSums, precision
+from gramoscope.pickup.texture.spectrum import CrossSpectra, LagSums, precision
 from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.pickup.texture.vector_lanes import LANES
 
@@ -305,7 +305,7 @@ class StripeLearning:
 
     def _forms(self, sums: LagSums, model: Model, loading: float) -> Forms:
         """What spectra say about paths, in the bins that they can tell apart."""
-        frequency = self._frequency(model.band, self.length)
+        frequency = model.band.frequencies(self.length)
         wide = sums.spectra(frequency, largest_lag_px=self.largest_lag_px)
         near = sums.spectra(frequency, largest_lag_px=self.change_lag_px)
         c = wide[:, INNER_ROWS, INNER_ROWS]
@@ -328,10 +328,6 @@ class StripeLearning:
         """The bank with the strongest filters of a form, of loudness 1 together, and how loud they were."""
         filters, sign = strongest_filters(form, seen.spectra, seen.root, self.filters)
         loudness = seen.loudness(filters)
-        fine, coarse = (self._frequency(model.band, length) for length in (model.length, seen.length))
+        fine, coarse = (model.band.frequencies(length) for length in (model.length, seen.length))
         filters = interpolated(filters / np.sqrt(loudness), coarse, fine)
         return replace(deaf, filters=filters.astype(np.float32), sign=sign.astype(np.float32)), loudness
-
-    def _frequency(self, band: Band, length: int) -> FloatArray:
-        """Of the bins of a transform that lie in a band, cycles a pixel."""
-        return np.arange(length // 2 + 1)[band.bins(length)] / length

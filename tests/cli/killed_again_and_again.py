@@ -1,6 +1,6 @@
 """Play a capture again and again, each time killed a little later; used by `test_killed.py`, in a process of its own.
 
-    python killed_at_random.py CAPTURE OUT KILLS SEED
+    python killed_again_and_again.py CAPTURE OUT KILLS SEED
 
 The first life ends before it has read anything, the last when all is read and it draws, those between after so many groups and
 a random while.
