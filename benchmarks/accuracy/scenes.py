@@ -162,6 +162,20 @@ GRID = (
         rig=MODEST_RIG,
         seed=6,
     ),
+    Case(
+        "heavy-7",
+        "heavy damage, modest rig, drawn anew: looked at by nobody while limits were chosen",
+        damage="heavy",
+        rig=MODEST_RIG,
+        seed=7,
+    ),
+    Case(
+        "heavy-8",
+        "heavy damage, modest rig, drawn anew: looked at by nobody while limits were chosen",
+        damage="heavy",
+        rig=MODEST_RIG,
+        seed=8,
+    ),
     Case("warp", "base, warped by 4 µm, focus drifting by 2 µm", rig=Rig(warp_m=4e-6, focus_drift_m=2e-6)),
     Case("uneven", "base, steps uneven by 8 %, groups off by 3 µm", rig=Rig(0.08, 3e-6)),
     Case(
