@@ -92,40 +92,57 @@ class Lesson:
 
 @dataclass(frozen=True, eq=False)
 class Lessons:
-    """What some stretches teach of one direction: readings, how loud each is, and the mean square of its slopes."""
+    """What some stretches teach of one direction: readings, how loud each is, and the mean square of its slopes.
 
+    Readings are means over blocks of `step_m`.
+    """
+
+    step_m: float
     readings: PlaceReadings
     level: FloatArray
     slope_power: FloatArray
 
 
-def lessons(stretches: Iterable[Lesson], step_m: float) -> Lessons | None:
-    """Return what all stretches teach together; None when all were hardly seen."""
-    seen = [lesson for lesson in stretches if lesson.seen.known >= LEAST_SAMPLES]
+def lessons(stretches: Iterable[Lesson], step_m: float, *, block: int = 1) -> Lessons | None:
+    """Return what all stretches teach together; None when all were hardly seen.
+
+    Parameters
+    ----------
+    stretches : iterable of Lesson
+    step_m : float
+        From one sample to the next.
+    block : int
+        So many neighbours are taken for one reading, where all of them are known: as good for what changes slowly, and
+        learned from in so many times less time.
+    """
+    both = [(lesson, _means(lesson.seen, block)) for lesson in stretches]
+    seen = [(lesson, means) for lesson, means in both if block * means.known >= LEAST_SAMPLES]
     if not seen:
         return None
-    power = [slope_power(lesson.seen, step_m) for lesson in seen]
-    readings = one_after_the_other([_counted_from_the_first(lesson) for lesson in seen])
-    return Lessons(readings, np.array([lesson.level for lesson in seen]), np.array(power))
+    power = [slope_power(lesson.seen, step_m) for lesson, _ in seen]
+    readings = [_counted_from_the_first(means, lesson.correlation_samples) for lesson, means in seen]
+    level = np.array([lesson.level for lesson, _ in seen])
+    return Lessons(block * step_m, one_after_the_other(readings), level, np.array(power))
 
 
-def _counted_from_the_first(lesson: Lesson) -> tuple[IntArray, FloatArray, FloatArray]:
-    one = lesson.seen
+def _means(one: OneDirection, block: int) -> OneDirection:
+    count = one.place_m.size // block
+    place, variance = (values[: count * block].reshape(count, block) for values in (one.place_m, one.variance))
+    return OneDirection(place.mean(axis=1), variance.sum(axis=1) / block**2)
+
+
+def _counted_from_the_first(one: OneDirection, correlation_samples: float) -> tuple[IntArray, FloatArray, FloatArray]:
     known = np.flatnonzero(np.isfinite(one.place_m))
     place = one.place_m[known]
-    return known - known[0], place - place[0], lesson.correlation_samples * one.variance[known]
+    return known - known[0], place - place[0], correlation_samples * one.variance[known]
 
 
-def learn(
-    given: Lessons | None, step_m: float, limits: PriorLimits, *, before: GroovePrior | None = None
-) -> GroovePrior:
+def learn(given: Lessons | None, limits: PriorLimits, *, before: GroovePrior | None = None) -> GroovePrior:
     """Return the prior under which the stretches are most likely.
 
     Parameters
     ----------
     given : Lessons or None
-    step_m : float
-        From one sample to the next.
     limits : PriorLimits
     before : GroovePrior, optional
         What was believed so far.
@@ -148,10 +165,15 @@ def learn(
         change = (logarithms - known) / (DRIFT if before else UNHEARD)
         prior = _prior(logarithms, limits)
         # the slopes of each stretch, of their bodies
-        sigma = np.maximum(prior.share * given.level, prior.floor) / prior.bend(step_m)
+        sigma = np.maximum(prior.share * given.level, prior.floor) / prior.bend(given.step_m)
         disbelief = 0.5 * float(change @ change) + 0.5 * _louder(given, sigma) ** 2
         return disbelief - steady_log_likelihood(
-            prior.steps(step_m), prior.at_rest(step_m), given.readings, sigma, place_sigma_m=ANYWHERE_M, gate=GATE
+            prior.steps(given.step_m),
+            prior.at_rest(given.step_m),
+            given.readings,
+            sigma,
+            place_sigma_m=ANYWHERE_M,
+            gate=GATE,
         )
 
     # what was learned in silence can be so far off that nothing leads away from it

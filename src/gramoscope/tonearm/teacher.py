@@ -29,8 +29,11 @@ from gramoscope.tonearm.place_samples import PlaceSamples, samples_of
 from gramoscope.tonearm.stretches import Stretch
 
 DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
-FIRST_TEACHERS, TEACHERS = 24, 6
-"""So many stretches of those that a prior is learned from are looked at, the first time and later."""
+BEYOND_SOUND_HZ = 28e3
+"""Where errors are compared with what they claim: no sound reaches so far, yet errors are those that sound has to bear."""
+READING_S = 10e-6
+"""How long the samples last whose mean is one reading for the learning of a prior; at 10 kHz it takes off a thirtieth of the
+power."""
 
 Priors = tuple[GroovePrior, GroovePrior]
 Levelled = tuple[Stretch, FloatArray]
@@ -100,13 +103,15 @@ class Teacher:
 
     def _learn(self, batch: Sequence[Levelled], before: Priors | None) -> tuple[Priors, float]:
         """Return what to believe of both directions, and how many times as large as claimed the errors are."""
-        limits = [self._limits(name, float(batch[0][0].arc_m[0])) for name in DIRECTIONS]
-        count = min(FIRST_TEACHERS if before is None else TEACHERS, len(batch))
-        chosen = [batch[i] for i in np.linspace(0, len(batch) - 1, count).round().astype(int)]
+        speed_m_s = float(self.course.rotation.speed_at_m_s(float(batch[0][0].arc_m[0])))
+        limits = [self._limits(name, speed_m_s) for name in DIRECTIONS]
+        half_period, reading = (
+            max(1, round(time_s * speed_m_s / self.step_m)) for time_s in (0.5 / BEYOND_SOUND_HZ, READING_S)
+        )
         believed = beliefs(before or (limits[0].middle, limits[1].middle), self.step_m)
-        cleaned = [(self._cleaned(believed, stretch, level), level) for stretch, level in chosen]
+        cleaned = [(self._cleaned(believed, stretch, level), level) for stretch, level in batch]
         # an error that neighbours share does not show in their differences: such a claim is believed
-        error = claim_error(trusted(stretch) for stretch, _ in cleaned if stretch.correlation_samples == 1)
+        error = claim_error((trusted(s) for s, _ in cleaned if s.correlation_samples == 1), half_period)
         teachers = [(_put_right(stretch, error), level) for stretch, level in cleaned]
         lateral, vertical = (
             learn(
@@ -116,8 +121,8 @@ class Teacher:
                         for s, level in teachers
                     ),
                     self.step_m,
+                    block=reading,
                 ),
-                self.step_m,
                 limits[i],
                 before=before[i] if before else None,
             )
@@ -144,19 +149,20 @@ class Teacher:
         suspect[measured] = ~followed.accepted
         return replace(stretch, suspect=suspect.reshape(2, -1, order="F"))
 
-    def _limits(self, direction: Direction, arc_m: float) -> PriorLimits:
-        speed = float(self.course.rotation.speed_at_m_s(arc_m))
+    def _limits(self, direction: Direction, speed_m_s: float) -> PriorLimits:
         mine = direction == self.course.direction
         floor = self.teaching.floor_m_s if mine else self.teaching.other_floor_m_s
         corner, cutoff, width = (
-            (2 * np.pi * low / speed, 2 * np.pi * high / speed)
+            (2 * np.pi * low / speed_m_s, 2 * np.pi * high / speed_m_s)
             for low, high in (
                 self.teaching.corner_limits_hz,
                 self.teaching.cutoff_limits_hz,
                 self.teaching.width_limits_hz,
             )
         )
-        return PriorLimits(floor / speed, corner, cutoff, width, 2 * np.pi * self.teaching.usual_width_hz / speed)
+        return PriorLimits(
+            floor / speed_m_s, corner, cutoff, width, 2 * np.pi * self.teaching.usual_width_hz / speed_m_s
+        )
 
 
 def _put_right(stretch: Stretch, error: float) -> Stretch:
