@@ -1,0 +1,58 @@
+"""What is learned of a groove's spectrum: from samples or from means of them, by all stretches that were seen."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gramoscope.tonearm.learn_groove import Lesson, PriorLimits, learn, lessons
+from gramoscope.tonearm.level import OneDirection, bend_power
+
+STEP_M = 3.125e-6
+SIGMA_M = 4e-8
+SPEED_M_S = 0.94
+
+
+def _per_m(*hz: float) -> Any:
+    return tuple(2 * np.pi * f / SPEED_M_S for f in hz)
+
+
+LIMITS = PriorLimits(3e-4, _per_m(300, 20e3), _per_m(2e3, 60e3), _per_m(6e3, 30e3), *_per_m(8e3))
+
+
+def _seen(place_m: np.ndarray) -> OneDirection:
+    return OneDirection(place_m, np.where(np.isfinite(place_m), SIGMA_M**2, np.nan))
+
+
+def test_blocks_are_means_with_smaller_errors_and_only_whole_ones_count() -> None:
+    place = np.arange(80.0) ** 2 * 1e-9
+    place[31] = np.nan
+    given = lessons([Lesson(_seen(place), 1.0, correlation_samples=2.0)], STEP_M, block=3)
+    assert given is not None
+    assert given.step_m == 3 * STEP_M
+    # 26 whole blocks, two samples left over, and one block has a hole
+    np.testing.assert_array_equal(given.readings.bin, np.delete(np.arange(26), 10))
+    means = place[:78].reshape(26, 3).mean(axis=1)
+    np.testing.assert_allclose(given.readings.value, np.delete(means - means[0], 10), atol=1e-20)
+    np.testing.assert_allclose(given.readings.variance, 2 * SIGMA_M**2 / 3)
+
+
+def test_a_stretch_of_which_hardly_a_block_is_whole_teaches_nothing() -> None:
+    place = np.zeros(100)
+    place[::3] = np.nan
+    assert lessons([Lesson(_seen(place), 1.0)], STEP_M, block=1) is not None
+    assert lessons([Lesson(_seen(place), 1.0)], STEP_M, block=3) is None
+    assert learn(None, LIMITS) == LIMITS.middle
+
+
+def test_means_teach_the_same_spectrum(bench: Any) -> None:
+    spectrum = lambda f: np.hypot(1 / (1 + (f / 900) ** 2), 0.03 / (1 + (f / 12_000) ** 3))  # noqa: E731
+    course, rng = bench.course(spectrum, 0.03, groups=64, seed=3), np.random.default_rng(4)
+    arc = (np.arange(64) * bench.group_step)[:, None] * STEP_M + np.arange(160) * STEP_M
+    seen = [_seen(course.place(one) + SIGMA_M * rng.normal(size=one.size)) for one in arc]
+    heard = [Lesson(one, np.sqrt(max(bend_power(one, STEP_M), 0.0))) for one in seen]
+    priors = [learn(lessons(heard, STEP_M, block=block), LIMITS) for block in (1, 3)]
+    k = 2 * np.pi * np.array([500.0, 1000, 2000, 4000, 8000, 14_000]) / SPEED_M_S
+    one, other = (prior.share**2 * prior.slope_density(k) / prior.bend(STEP_M) ** 2 for prior in priors)
+    assert np.max(np.abs(10 * np.log10(other / one))) < 1.5
