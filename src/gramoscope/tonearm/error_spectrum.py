@@ -119,15 +119,19 @@ def _without_a_wall(information: FloatArray, length_m: FloatArray) -> FloatArray
 
 def _believed(models: Sequence[GrooveModel], starts: IntArray, lengths: IntArray, wavenumber: FloatArray) -> FloatArray:
     """Densities of the slopes in both directions at the wavenumbers of each run, shape (run, 2, frequency)."""
-    believed = np.empty((starts.size, 2, wavenumber.shape[1]))
     numbers = which(models, starts + lengths // 2)
+    power = np.empty((starts.size, 2))
     for run, (start, length, number) in enumerate(zip(starts, lengths, numbers, strict=True)):
         model = models[number]
         first = max(start - model.from_bin, 0)
         restless = model.agitation[first : first + length]
-        power = model.sigma**2 * (float(np.mean(restless)) if restless.size else 1.0)
-        for i, prior in enumerate(model.priors):
-            believed[run, i] = power[i] * prior.slope_density(wavenumber[run])
+        power[run] = model.sigma**2 * (float(restless.sum()) / restless.size if restless.size else 1.0)
+    believed = np.empty((starts.size, 2, wavenumber.shape[1]))
+    # one prior holds for many stretches
+    for priors in {models[number].priors for number in numbers}:
+        mine = [run for run, number in enumerate(numbers) if models[number].priors == priors]
+        for i, prior in enumerate(priors):
+            believed[mine, i] = power[mine, i, None] * prior.slope_density(wavenumber[mine])
     return believed
 
 

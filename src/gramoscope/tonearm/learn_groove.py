@@ -1,4 +1,4 @@
-"""Learning from a few stretches what the spectrum of the groove is like: the prior under which what was seen is most likely.
+"""Learning from many stretches what the spectrum of the groove is like: the prior under which what was seen is most likely.
 
 Where the groove is well seen the prior matters only above the frequency at which the readings drown, and for the error bars;
 there it needs many samples, for what it is to find is hidden in their noise. What was believed before therefore counts as if
@@ -8,6 +8,7 @@ learned but given (`tonearm.level`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -155,6 +156,8 @@ def learn(given: Lessons | None, limits: PriorLimits, *, before: GroovePrior | N
     """
     if given is None:
         return before or limits.middle
+    heard = np.isfinite(given.slope_power)
+    power = float(np.mean(given.slope_power[heard])) if heard.any() else 0.0
     known, first, step = (
         _logarithms(before or limits.middle),
         _logarithms(limits.middle),
@@ -166,7 +169,7 @@ def learn(given: Lessons | None, limits: PriorLimits, *, before: GroovePrior | N
         prior = _prior(logarithms, limits)
         # the slopes of each stretch, of their bodies
         sigma = np.maximum(prior.share * given.level, prior.floor) / prior.bend(given.step_m)
-        disbelief = 0.5 * float(change @ change) + 0.5 * _louder(given, sigma) ** 2
+        disbelief = 0.5 * float(change @ change) + 0.5 * _louder(sigma[heard], power) ** 2
         return disbelief - steady_log_likelihood(
             prior.steps(given.step_m),
             prior.at_rest(given.step_m),
@@ -186,17 +189,15 @@ def learn(given: Lessons | None, limits: PriorLimits, *, before: GroovePrior | N
     return _prior(found, limits)
 
 
-def _louder(given: Lessons, sigma: FloatArray) -> float:
-    """How many standard errors louder the prior believes the groove to be than its slopes are.
+def _louder(sigma: FloatArray, power: float) -> float:
+    """How many standard errors louder the prior believes the groove to be than the power of its slopes is.
 
     The likelihood knows the spectrum best where it meets the noise; extrapolated to the bass from there, it would fill gaps
     with thunder.
     """
-    known = np.isfinite(given.slope_power)
-    power = float(np.mean(given.slope_power[known])) if known.any() else 0.0
     if power <= 0:
         return 0.0
-    return float(0.5 * np.log(np.mean(sigma[known] ** 2) / power) / SLOPE_SIGMA)
+    return 0.5 * math.log(float(sigma @ sigma) / sigma.size / power) / SLOPE_SIGMA
 
 
 def _least(
