@@ -187,7 +187,7 @@ def follow_rows(columns, path_row, taps, half, window):  # type: ignore[no-untyp
     """Write a window, its rows in sixteens, that begins `half` rows before the path, by taps of phases from 0 to 1."""
     width, rows = window.shape
     height, count = columns.shape[1], taps.shape[1]
-    reach = rows + count - 1
+    reach = rows + LANES  # so many are looked at
     edge = np.empty(reach, np.float32)
     picture, tap, into = columns.reshape(columns.size), taps.reshape(taps.size), window.reshape(window.size)
     for x in range(width):

@@ -20,6 +20,8 @@ from numba.extending import intrinsic
 LANES = 16
 AT_ONCE = 4
 """So many columns are worked on together: what they share is read once."""
+INTERPOLATED_FROM = 10
+"""Rows of a picture that make one of a window."""
 _REAL, _LONG, _INT = ir.FloatType(), ir.IntType(64), ir.IntType(32)
 _VECTOR = ir.VectorType(_REAL, LANES)
 _ANY = ir.Constant(_VECTOR, ir.Undefined)
@@ -78,9 +80,28 @@ class _Writer:
         """One number, known beforehand, in all places of a vector."""
         return ir.Constant(_VECTOR, [value] * LANES)
 
-    def total(self, vector: Value) -> Value:
-        """The sum of a vector, halves first."""
-        return self.builder.extract_element(self._folded(vector, (8, 4, 2, 1)), ir.Constant(_INT, 0))
+    def cut(self, one: Value, other: Value, begin: int) -> Value:
+        """Sixteen numbers of two vectors, one after the other, from a place on."""
+        order = ir.Constant(ir.VectorType(_INT, LANES), [begin + j for j in range(LANES)])
+        return self.builder.shuffle_vector(one, other, order)
+
+    def totals_of_four(self, vectors: list[Value]) -> list[Value]:
+        """The sums of four vectors, halves first; in pairs, the first two in one vector of two, as the others."""
+        one, other = (self._halves_added(vectors[k], vectors[k + 1], LANES // 2) for k in (0, 2))
+        folded = self._folded(self._halves_added(one, other, LANES // 4), (2, 1))
+        pairs = ((0, LANES // 4), (LANES // 2, 3 * LANES // 4))
+        return [
+            self.builder.shuffle_vector(folded, _ANY, ir.Constant(ir.VectorType(_INT, 2), list(pair))) for pair in pairs
+        ]
+
+    def _halves_added(self, one: Value, other: Value, far: int) -> Value:
+        """Of stretches of twice `far` numbers the first half and the second added, of one vector and then of another."""
+        first = [j for j in range(2 * LANES) if j // far % 2 == 0]
+        kind = ir.VectorType(_INT, LANES)
+        low, high = (ir.Constant(kind, [j + more for j in first]) for more in (0, far))
+        return self.builder.fadd(
+            self.builder.shuffle_vector(one, other, low), self.builder.shuffle_vector(one, other, high)
+        )
 
     def totals_of_halves(self, vector: Value) -> tuple[Value, Value]:
         """The sums of the first and of the last eight of a vector."""
@@ -130,12 +151,17 @@ def _function(arguments: tuple[Any, ...], write: Callable[[_Writer], None]) -> A
 
 def _interpolation(w: _Writer) -> None:
     picture, first, soon, taps, tap, window, place, rows = w.arguments
-    weight = [w.spread(taps, w.plus(tap, k)) for k in range(10)]
+    weight = [w.spread(taps, w.plus(tap, k)) for k in range(INTERPOLATED_FROM)]
+    last = _room(w.builder, _VECTOR)
+    w.builder.store(w.load(picture, first), last)
 
     def lanes(number: Value) -> None:
         row = w.times(number, LANES)
         w.call_for(picture, w.plus(w.plus(first, soon), row))
-        seen = [w.load(picture, w.plus(w.plus(first, row), k)) for k in range(10)]
+        here, next_ = w.builder.load(last), w.load(picture, w.plus(w.plus(first, LANES), row))
+        w.builder.store(next_, last)
+        # what begins a few rows on is cut out of both: reading it again would be dearer, as most of it lies in two lines
+        seen = [here] + [w.cut(here, next_, k) for k in range(1, INTERPOLATED_FROM)]
         near, far = w.builder.fmul(weight[3], seen[3]), w.builder.fmul(weight[0], seen[0])
         for k in (4, 5, 6, 8):
             near = w.times_and(weight[k], seen[k], near)
@@ -278,12 +304,16 @@ def _weighing(w: _Writer) -> None:
     real = b.fmul(half, w.times_and(sine, odd[1], w.times_and(cosine, odd[0], even[0])))
     imaginary = b.fmul(half, w.less(w.times_and(cosine, odd[1], even[1]), sine, odd[0]))
 
-    def weigh(k: Value) -> None:
-        weight = w.load(weights, w.plus(begin, w.times(k, LANES)))
-        for part, first in ((real, 0), (imaginary, LANES)):
-            b.store(w.total(b.fmul(weight, part)), b.gep(out, [w.plus(w.plus(into, k), first)]))
+    def weigh(number: Value) -> None:
+        k = w.times(number, 2)
+        row = w.plus(begin, w.times(k, LANES))
+        weight = [w.load(weights, w.plus(row, more)) for more in (0, LANES)]
+        totals = w.totals_of_four([b.fmul(one, part) for part in (real, imaginary) for one in weight])
+        for first, pair in zip((0, LANES), totals, strict=True):
+            at = b.gep(out, [w.plus(w.plus(into, k), first)])
+            b.store(pair, b.bitcast(at, ir.VectorType(_REAL, 2).as_pointer()), align=4)
 
-    w.loop(count, weigh)
+    w.loop(b.sdiv(count, ir.Constant(_LONG, 2)), weigh)
 
 
 def _folding(w: _Writer) -> None:
@@ -300,7 +330,7 @@ def _folding(w: _Writer) -> None:
 
 @_compiled
 def weigh_bin(_, z, here, there, turn, place, weights, begin, count, out, into):  # type: ignore[no-untyped-def]
-    """Write sums over sixteen rows by some weights, of a bin that is in two places of `lane_transform.transform`."""
+    """Write sums over sixteen rows by some weights, an even number of them, of a bin that is in two places of `lane_transform.transform`."""
     return _function((z, here, there, turn, place, weights, begin, count, out, into), _weighing)
 
 
@@ -336,7 +366,7 @@ def fifths(_, source, here, far, twiddle, place, target, there, near, count):  #
 
 @_compiled
 def interpolate(_, picture, first, soon, taps, tap, window, place, rows):  # type: ignore[no-untyped-def]
-    """Write rows of a window, a multiple of 16, each from ten rows of a picture by ten taps."""
+    """Write rows of a window, a multiple of 16, each from ten rows of a picture by ten taps; 16 rows more are looked at."""
     return _function((picture, first, soon, taps, tap, window, place, rows), _interpolation)
 
 
