@@ -10,11 +10,16 @@ from gramoscope.pickup.texture.following import (
     GENTLE,
     REACH,
     SHARP,
+    STEPS,
+    TAPS,
     across,
     channels,
     follow,
     interpolation_taps,
     shifted,
+    step_mixtures,
+    step_of,
+    stepped,
     wide_rows,
 )
 
@@ -128,6 +133,29 @@ def test_channels_are_weighted_sums_of_the_rows(
     direct = follow(picture[:width], path[:width], half_px).astype(np.float64) @ basis
     assert found.shape == (width, 5)
     np.testing.assert_allclose(found, direct, atol=1e-5 * np.abs(direct).max())
+
+
+def test_a_path_in_steps_is_the_nearest_and_what_is_left_is_told(path: np.ndarray) -> None:
+    rows, aside = np.stack([path, path - 50]), np.empty((2, path.size))
+    before = rows.copy()
+    stepped(rows, aside)
+    np.testing.assert_array_equal(rows * STEPS, np.round(rows * STEPS))
+    np.testing.assert_allclose(rows + aside, before, atol=1e-12)
+    assert 0.4 / STEPS < np.abs(aside).max() <= 0.5 / STEPS
+
+
+def test_channels_are_mixed_of_the_picture_as_of_a_window(picture: np.ndarray, path: np.ndarray) -> None:
+    basis = np.random.default_rng(3).normal(size=(wide_rows(HALF_PX), 5)).astype(np.float32)
+    rows = path.copy()
+    stepped(rows, np.empty_like(rows))
+    mixtures = step_mixtures(basis)
+    assert mixtures.shape == (STEPS, wide_rows(HALF_PX) + TAPS - 1, 5)
+    places = [step_of(row, HALF_PX + REACH) for row in rows]
+    inside = [x for x, (first, _) in enumerate(places) if 0 <= first <= picture.shape[1] - mixtures.shape[1]]
+    assert len(inside) > 100
+    found = [picture[x, places[x][0] :][: mixtures.shape[1]].astype(float) @ mixtures[places[x][1]] for x in inside]
+    direct = follow(picture, rows, HALF_PX).astype(np.float64) @ basis
+    np.testing.assert_allclose(found, direct[inside], atol=1e-5 * np.abs(direct).max())
 
 
 @pytest.mark.parametrize("px", [-383 / 512, -0.25, 0.0, 0.3125, 511 / 512])

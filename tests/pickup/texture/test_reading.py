@@ -14,7 +14,7 @@ from gramoscope.errors import ArgumentError
 from gramoscope.pickup.overlay import places_brighter
 from gramoscope.pickup.texture import reading
 from gramoscope.pickup.texture.filter_bank import FilterBank
-from gramoscope.pickup.texture.hearing import clear_columns
+from gramoscope.pickup.texture.hearing import add_up, clear_columns
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.learning import Learning
 from gramoscope.pickup.texture.likelihood import StripeStatistics
@@ -325,3 +325,14 @@ def test_a_tone_is_laid_upon_a_picture_once(another: Stretch) -> None:
     assert another.in_tone(Tone(80.0, 0.0)) is another
     with pytest.raises(AssertionError):
         seen.in_tone(Tone(100.0, 0.5))
+
+
+def test_what_is_said_beside_a_path_counts_as_if_it_had_been_said_of_the_path() -> None:
+    # stripes that answer 4 and 1 to a row, of a path that is missed by 0.3 rows on one wall and −0.1 on the other
+    information, wall, missed = np.array([4.0, 1.0, 1.0]), np.array([0, 1, 1]), np.array([0.3, -0.1])
+    aside, weight = np.random.default_rng(1).uniform(-0.5, 0.5, (3, 50)) / 32, np.full((3, 50), 0.5, np.float32)
+    said = information[:, None] * (missed[wall][:, None] + aside)
+    score, known = np.zeros((2, 2, 50))
+    add_up(said, weight, aside, wall, information, score, known)
+    np.testing.assert_allclose(score / known, np.broadcast_to(missed[:, None], (2, 50)), atol=1e-12)
+    np.testing.assert_allclose(known[:, 0], [2.0, 1.0])

@@ -18,8 +18,8 @@ def _interpolate(picture, first, soon, taps, tap, window, place, rows):  # type:
 
 
 @numba.njit
-def _mix(window, first, rows, basis, begin, out, place):  # type: ignore[no-untyped-def]
-    mix(window, first, rows, basis, begin, out, place)
+def _mix(picture, places, number, rows, mixture, begin, out, targets):  # type: ignore[no-untyped-def]
+    mix(picture, places, number, rows, mixture, begin, out, targets)
 
 
 @numba.njit
@@ -45,13 +45,17 @@ def test_rows_are_interpolated_from_ten() -> None:
     assert not _outside(window, 5, 2 * LANES).any()
 
 
-def test_rows_are_mixed_by_a_basis() -> None:
+def test_rows_are_mixed_wherever_they_lie() -> None:
     rows = 7
-    window, basis, out = _normal(6, rows), _normal(rows + 2, LANES), np.zeros(3 + (AT_ONCE + 1) * LANES, np.float32)
-    _mix(window.ravel(), rows, rows, basis.ravel(), 2 * LANES, out, 3)
-    expected = window[1 : 1 + AT_ONCE].astype(float) @ basis[2:].astype(float)
-    np.testing.assert_allclose(out[3 : 3 + AT_ONCE * LANES].reshape(AT_ONCE, LANES), expected, atol=1e-5)
-    assert not _outside(out, 3, AT_ONCE * LANES).any()
+    picture, mixture, out = _normal(80), _normal(rows + 2, LANES), np.zeros((AT_ONCE + 2) * LANES, np.float32)
+    # of the next four places, which are only called for, nothing need be there
+    places = np.array([99, 60, 3, 3, 41, *[10**6] * AT_ONCE])
+    targets = np.array([0, 4, 2, 1, 3]) * LANES + 5
+    _mix(picture, places, 1, rows, mixture.ravel(), 2 * LANES, out, targets)
+    for place, target in zip(places[1:5], targets[1:], strict=True):
+        expected = picture[place : place + rows].astype(float) @ mixture[2:].astype(float)
+        np.testing.assert_allclose(out[target : target + LANES], expected, atol=1e-5)
+    assert not _outside(out, 5 + LANES, AT_ONCE * LANES).any()
 
 
 def test_columns_are_filtered_alike_to_both_sides() -> None:

@@ -43,6 +43,9 @@ def interpolation_taps(fraction: FloatArray) -> Float32Array:
 
 
 TAPS_OF_PHASES = interpolation_taps(np.arange(PHASES + 1) / PHASES)
+STEP_BITS = 5
+STEPS = 1 << STEP_BITS
+"""A path that is read is followed in so many steps a row: see `stepped`."""
 REACH = 8
 """Rows beyond a window on each side that its derivatives, and windows a little to the side of it, need."""
 GENTLE = np.array([45.0, -9.0, 1.0]) / 60
@@ -180,6 +183,47 @@ def places_of(path_row: FloatArray, half: int) -> tuple[IntArray, IntArray]:
     floor = np.floor(path_row)
     phase = ((path_row - floor) * PHASES + 0.5).astype(np.int64)
     return floor.astype(np.int64) - half - BEFORE, phase
+
+
+@numba.njit(cache=True, nogil=True)
+def stepped(path_row, aside):  # type: ignore[no-untyped-def]
+    """Move paths to the nearest of `STEPS` places a row, and write how far they are from there, in rows.
+
+    With so few places what interpolates and what mixes channels can be one for each, and stay in the cache. A score at a
+    place beside the path differs from the path's by information times distance, which is known (`hearing.add_up`).
+    """
+    rows, left = path_row.reshape(path_row.size), aside.reshape(aside.size)
+    for n in range(rows.size):
+        nearest = np.floor(rows[n] * STEPS + 0.5) / STEPS
+        left[n] = rows[n] - nearest
+        rows[n] = nearest
+
+
+@numba.njit(cache=True, nogil=True)
+def step_of(row, half):  # type: ignore[no-untyped-def]
+    """Return the first row that the first row of a window about a row is interpolated from, and the step between rows."""
+    nearest = int(np.floor(row * STEPS + 0.5))
+    return (nearest >> STEP_BITS) - half - BEFORE, nearest & (STEPS - 1)
+
+
+def step_mixtures(basis: Float32Array) -> Float32Array:
+    """Return what makes channels of the picture's own rows in place of a window's: the interpolation and the basis in one.
+
+    Parameters
+    ----------
+    basis : float32 array, shape (row, channel)
+        Of a window and the rows beyond it.
+
+    Returns
+    -------
+    float32 array, shape (step, row + 9, channel)
+    """
+    rows = len(basis)
+    taps = interpolation_taps(np.arange(STEPS) / STEPS)
+    mixtures = np.zeros((STEPS, rows + TAPS - 1, basis.shape[1]), np.float32)
+    for k in range(TAPS):
+        mixtures[:, k : k + rows] += taps[:, k, None, None] * basis
+    return mixtures
 
 
 @numba.njit(cache=True, nogil=True)

@@ -15,7 +15,7 @@ import numba
 import numpy as np
 
 from gramoscope.conventions import INNER, OUTER, BoolArray, Float32Array, FloatArray, IntArray
-from gramoscope.pickup.texture.following import REACH, TAPS_OF_PHASES, follow_rows, padded_rows, wide_rows
+from gramoscope.pickup.texture.following import REACH, STEPS, step_mixtures, step_of, wide_rows
 from gramoscope.pickup.texture.lane_transform import PAIR, fold, let_through, plan_for, transform
 from gramoscope.pickup.texture.layout import StripeLayout, see
 from gramoscope.pickup.texture.likelihood import (
@@ -49,7 +49,7 @@ class Ear:
         Which of the layout's stripes these are.
     wall : int64 array, shape (stripe,)
     basis : float32 array, shape (stripe, row, channel)
-        Rows as `following` pads them.
+        Of a window and the rows beyond it.
     usual : float32 array, shape (stripe, channel, 16)
     filters : float32 array, shape (stripe, bin in the band, filter, channel)
     sign : float32 array, shape (stripe, filter)
@@ -80,8 +80,9 @@ class Ear:
 
     @cached_property
     def in_lanes(self) -> tuple[Float32Array, Float32Array, Float32Array]:
-        """The basis, what is usual and the filters, with sixteen channels."""
-        return _in_lanes(self.basis, (2,)), _in_lanes(self.usual, (1,)), _in_lanes(self.filters, (3,))
+        """What makes channels of the picture's rows, step by step, what is usual and the filters; of sixteen channels."""
+        mixtures = [step_mixtures(basis) for basis in _in_lanes(self.basis, (2,))]
+        return _stacked(mixtures, 3), _in_lanes(self.usual, (1,)), _in_lanes(self.filters, (3,))
 
 
 def ear_of(
@@ -97,7 +98,7 @@ def ear_of(
     known = [(number, one) for number, one in enumerate(stripes) if one is not None]
     number = np.array([n for n, _ in known], np.int64)
     channels = max((one.bank.basis.shape[1] for _, one in known), default=0)
-    basis = np.zeros((len(known), padded_rows(wide_rows(half_px)), channels), np.float32)
+    basis = np.zeros((len(known), wide_rows(half_px), channels), np.float32)
     for i, (_, one) in enumerate(known):
         basis[i, : one.bank.basis.shape[0]] = one.bank.basis
     banks = [one.bank for _, one in known]
@@ -189,20 +190,70 @@ def _burn(burnt, rows, half_px, clear):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _whiten(window, basis, half_taps, usual, white, power):  # type: ignore[no-untyped-def]
-    """Write whitened channels of a window and how much of the usual texture they show; columns in fours, channels sixteen.
+def _sort_by_step(row, height, half, rows, begin, rooms):  # type: ignore[no-untyped-def]
+    """Sort columns by the step between rows that a path is at; return how many windows leave the picture, and which.
 
-    The window's last columns are black where they are not in the picture, of as many columns as `power`.
+    Places in the picture and among channels of sixteen go to the rooms, those of a step from its begin on in fours, of which
+    the last one is filled up by one more of the same. Eight more places may be called for.
     """
-    width, rows, reach = len(power), window.shape[1], half_taps.size - 1
-    wide = np.empty((len(white) + 2 * reach, LANES), np.float32)
-    lines = wide.reshape(wide.size)
-    seen, weights, form = window.reshape(window.size), basis.reshape(basis.size), usual.reshape(usual.size)
+    first_row, step, order, places, targets = rooms
+    begin[:] = 0
+    outside = 0
+    for x in range(row.size):
+        first_row[x], step[x] = step_of(row[x], half)
+        if first_row[x] >= 0 and first_row[x] + rows <= height:
+            begin[step[x] + 1] += 1
+        else:
+            step[x] = STEPS
+            order[outside] = x
+            outside += 1
+    for p in range(STEPS):
+        begin[p + 1] = begin[p] + (begin[p + 1] + AT_ONCE - 1) // AT_ONCE * AT_ONCE
+    places[begin[STEPS] : begin[STEPS] + 2 * AT_ONCE] = 0
+    for x in range(row.size):
+        if step[x] < STEPS:
+            at = begin[step[x]]
+            begin[step[x]] = at + 1
+            places[at], targets[at] = x * height + first_row[x], x * LANES
+    for p in range(STEPS):
+        last = begin[p]
+        while last % AT_ONCE:
+            places[last], targets[last] = places[last - 1], targets[last - 1]
+            last += 1
+    return outside
+
+
+@numba.njit(cache=True, nogil=True)
+def _mix(columns, row, half, mixtures, begin, rooms, lines):  # type: ignore[no-untyped-def]
+    """Write the channels of windows about a path, all columns of a step together; the picture's last rows are repeated."""
+    height, rows = columns.shape[1], mixtures.shape[1]
+    _, _, order, places, targets = rooms
+    picture, mixture = columns.reshape(columns.size), mixtures.reshape(mixtures.size)
+    outside = _sort_by_step(row, height, half, rows, begin, rooms)
+    number = 0
+    for p in range(STEPS):
+        while number < begin[p]:
+            mix(picture, places, number, rows, mixture, p * rows * LANES, lines, targets)
+            number += AT_ONCE
+    edge = np.empty(rows, np.float32)
+    for x in order[:outside]:
+        first, step = step_of(row[x], half)
+        for j in range(rows):
+            edge[j] = columns[x, min(max(first + j, 0), height - 1)]
+        places[: 2 * AT_ONCE], targets[:AT_ONCE] = 0, x * LANES
+        mix(edge, places, 0, rows, mixture, step * rows * LANES, lines, targets)
+
+
+@numba.njit(cache=True, nogil=True)
+def _whiten(wide, width, half_taps, usual, white, power):  # type: ignore[no-untyped-def]
+    """Write whitened channels and how much of the usual texture they show; columns in fours, channels sixteen.
+
+    Before and after the channels are as many columns as the whitener reaches; they are mirrored there.
+    """
+    reach = half_taps.size - 1
+    lines, form = wide.reshape(wide.size), usual.reshape(usual.size)
     out, powers = white.reshape(white.size), np.empty((len(white), 2), np.float32)
     into = powers.reshape(powers.size)
-    for x in range(0, len(white), AT_ONCE):
-        mix(seen, x * rows, rows, weights, 0, lines, (reach + x) * LANES)
-    wide[reach + len(white) :] = np.float32(0)
     for k in range(reach):
         # a window that is shorter than the mirror repeats its other end
         mirrored = min(k, width - 1)
@@ -216,12 +267,13 @@ def _whiten(window, basis, half_taps, usual, white, power):  # type: ignore[no-u
 
 
 @numba.njit(cache=True, nogil=True)
-def _draw(columns, row, clear, half_px, half_taps, basis, usual, limits, rooms, drawn, weight):  # type: ignore[no-untyped-def]
+def _draw(columns, row, clear, half_px, half_taps, mixtures, usual, limits, rooms, drawn, weight):  # type: ignore[no-untyped-def]
     """Write the whitened channels of a stripe, times their weight, and the weight; columns beyond the picture are black."""
-    window, white, power, valid = rooms
-    width = columns.shape[0]
-    follow_rows(columns, row, TAPS_OF_PHASES, half_px + REACH, window[:width])
-    _whiten(window, basis, half_taps, usual, white, power)
+    begin, sorting, wide, white, power, valid = rooms
+    width, reach = columns.shape[0], half_taps.size - 1
+    lines = wide.reshape(wide.size)[reach * LANES :]
+    _mix(columns, row, half_px + REACH, mixtures, begin, sorting, lines)
+    _whiten(wide, width, half_taps, usual, white, power)
     within(power, TEXTURE_PX // 2, limits[0], limits[1], valid)
     valid &= clear
     soften(valid, TAPER, weight)
@@ -229,6 +281,17 @@ def _draw(columns, row, clear, half_px, half_taps, basis, usual, limits, rooms, 
         share = weight[x]
         for c in range(LANES):
             drawn[x, c] = white[x, c] * share
+
+
+@numba.njit(cache=True, nogil=True)
+def _rooms(width, reach):  # type: ignore[no-untyped-def]
+    """Return room for what `_draw` needs; columns beyond the picture are black."""
+    padded = -(-width // AT_ONCE) * AT_ONCE
+    wide, white = np.zeros((padded + 2 * reach, LANES), np.float32), np.empty((padded, LANES), np.float32)
+    most = width + AT_ONCE * (STEPS + 2)
+    whole = (np.empty(width, np.int64), np.empty(width, np.int64), np.empty(width, np.int64))
+    begin, sorting = np.empty(STEPS + 1, np.int64), (*whole, np.empty(most, np.int64), np.empty(most, np.int64))
+    return begin, sorting, wide, white, np.empty((width, 2), np.float32), np.empty(width, np.bool_)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -247,13 +310,10 @@ def _energies(answers, lane, sign, score, loudness):  # type: ignore[no-untyped-
 @numba.njit(cache=True, nogil=True)
 def _listen(columns, rows, clear, half_px, ear, plan, first_bin, limits, said, weight):  # type: ignore[no-untyped-def]
     """One look at all stripes; their filters' answers come back as many at a time as there are lanes."""
-    half_taps, basis, usual, filters, sign, mean, trust = ear
+    half_taps, mixtures, usual, filters, sign, mean, trust = ear
     radix, twiddle, turn = plan
     stripes, width, count, m = rows.shape[0], columns.shape[0], sign.shape[1], len(turn) - 1
-    padded = -(-width // AT_ONCE) * AT_ONCE
-    window, white = np.empty((padded, basis.shape[1]), np.float32), np.empty((padded, LANES), np.float32)
-    window[width:] = np.float32(0)
-    rooms = window, white, np.empty((width, 2), np.float32), np.empty(width, np.bool_)
+    rooms = _rooms(width, half_taps.size - 1)
     drawn = np.zeros((2 * m, LANES), np.float32)
     one, other, bins = (
         np.empty(m * PAIR, np.float32),
@@ -270,7 +330,9 @@ def _listen(columns, rows, clear, half_px, ear, plan, first_bin, limits, said, w
                 weight[i] = np.float32(0)
                 bins.reshape(m + 1, 2, LANES)[:, :, lane : lane + count] = np.float32(0)
                 continue
-            _draw(columns, rows[i], clear[i], half_px, half_taps, basis[i], usual[i], limits, rooms, drawn, weight[i])
+            _draw(
+                columns, rows[i], clear[i], half_px, half_taps, mixtures[i], usual[i], limits, rooms, drawn, weight[i]
+            )
             where = transform(drawn.reshape(drawn.size), 0, radix, twiddle, one, other)
             let_through(one if where == 0 else other, turn, filters[i], first_bin, bins, lane)
         fold(bins, turn, one)
@@ -291,11 +353,14 @@ def _in_lanes(weights: Float32Array, axes: tuple[int, ...]) -> Float32Array:
 
 
 @numba.njit(cache=True, nogil=True)
-def add_up(said, weight, wall, information, score, sum_of_information):  # type: ignore[no-untyped-def]
-    """Add what stripes say to their walls, [wall, column], and how much they know, by their weight."""
+def add_up(said, weight, aside, wall, information, score, sum_of_information):  # type: ignore[no-untyped-def]
+    """Add what stripes say to their walls, [wall, column], and how much they know, by their weight.
+
+    They spoke of places beside which the path is; with a path that lies so far aside they ask for so much less.
+    """
     for i in range(wall.size):
         for x in range(said.shape[1]):
-            score[wall[i], x] += said[i, x] * weight[i, x]
+            score[wall[i], x] += (said[i, x] - information[i] * aside[i, x]) * weight[i, x]
             sum_of_information[wall[i], x] += information[i] * weight[i, x]
 
 
@@ -310,7 +375,7 @@ def heard(
     columns : float32 array, shape (column, row)
         The picture, transposed, in the tone of the model.
     rows : float64 array, shape (stripe, column)
-        The paths.
+        The paths, `following.stepped`.
     clear : bool array, shape (stripe, column)
         Where to listen, see `clear_columns`.
     power_limits : (float, float)

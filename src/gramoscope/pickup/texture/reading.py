@@ -21,7 +21,7 @@ from gramoscope.disc.formats import Cut
 from gramoscope.errors import require
 from gramoscope.pickup.texture.coarse_path import sign_of
 from gramoscope.pickup.texture.filter_bank import FilterBank
-from gramoscope.pickup.texture.following import channels, follow
+from gramoscope.pickup.texture.following import channels, follow, stepped
 from gramoscope.pickup.texture.hearing import Ear, add_up, clear_columns, ear_of
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.likelihood import StripeStatistics, quiet_powers
@@ -159,8 +159,10 @@ def evidence(stretch: Stretch, model: Model, rules: Rules, *, judged: bool = Tru
     columns = seen.columns.shape[0]
     require(columns <= ear.length, f"a stretch of {columns} columns", f"at most {ear.length}, as the passage taught")
     rows, clear = clear_columns(seen, model.layout, ear.number, half_px=ear.half_px, least_support=rules.least_support)
+    aside = np.empty_like(rows)
+    stepped(rows, aside)
     said, weight = seen.device.heard(ear, seen.columns, rows, clear, power_limits=rules.power_limits)
-    add_up(said, weight, ear.wall, ear.trust * ear.information, score, information)
+    add_up(said, weight, aside, ear.wall, ear.trust * ear.information, score, information)
     return Evidence(score, information, _surprise(ear, said, weight) if judged else np.full(2, np.nan))
 
 

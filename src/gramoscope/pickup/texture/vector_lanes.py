@@ -2,7 +2,7 @@
 
 Numba's loops over sixteen channels, or sixteen rows, are split where they need not be, and what they add up goes to memory and
 comes back. Told that sixteen numbers are one vector, LLVM keeps sums in registers, whatever the processor has, and windows are
-followed, mixed and whitened in half the time. Arrays are C-contiguous and given with the place in them where to begin, counted
+mixed and whitened in half the time. Arrays are C-contiguous and given with the place in them where to begin, counted
 in numbers, for making views costs as much as the work; all lengths are in numbers too.
 """
 
@@ -20,6 +20,8 @@ from numba.extending import intrinsic
 LANES = 16
 AT_ONCE = 4
 """So many columns are worked on together: what they share is read once."""
+LINES_CALLED_FOR = 4
+"""Of the cache, of sixteen numbers each: what a window's rows lie in."""
 INTERPOLATED_FROM = 10
 """Rows of a picture that make one of a window."""
 _REAL, _LONG, _INT = ir.FloatType(), ir.IntType(64), ir.IntType(32)
@@ -53,6 +55,10 @@ class _Writer:
 
     def load(self, array: Value, place: Value) -> Value:
         return self.builder.load(self._at(array, place), align=4)
+
+    def whole(self, array: Value, place: Value) -> Value:
+        """A whole number."""
+        return self.builder.load(self.builder.gep(array, [place]))
 
     def store(self, value: Value, array: Value, place: Value) -> None:
         self.builder.store(value, self._at(array, place), align=4)
@@ -173,17 +179,22 @@ def _interpolation(w: _Writer) -> None:
 
 
 def _mixture(w: _Writer) -> None:
-    window, first, rows, basis, begin, out, place = w.arguments
+    picture, places, number, rows, mixture, begin, out, targets = w.arguments
+    for k in range(AT_ONCE):
+        soon = w.whole(places, w.plus(number, AT_ONCE + k))
+        for line in range(LINES_CALLED_FOR):
+            w.call_for(picture, w.plus(soon, line * LANES))
+    first = [w.whole(places, w.plus(number, k)) for k in range(AT_ONCE)]
     sums = w.sums(AT_ONCE)
 
     def row(j: Value) -> None:
-        weight = w.load(basis, w.plus(begin, w.times(j, LANES)))
-        for k, room in enumerate(sums):
-            w.add_product(room, w.spread(window, w.plus(w.plus(first, j), w.times(rows, k))), weight)
+        weight = w.load(mixture, w.plus(begin, w.times(j, LANES)))
+        for room, place in zip(sums, first, strict=True):
+            w.add_product(room, w.spread(picture, w.plus(place, j)), weight)
 
     w.loop(rows, row)
     for k, room in enumerate(sums):
-        w.store(w.builder.load(room), out, w.plus(place, k * LANES))
+        w.store(w.builder.load(room), out, w.whole(targets, w.plus(number, k)))
 
 
 def _symmetric_filter(w: _Writer) -> None:
@@ -330,7 +341,10 @@ def _folding(w: _Writer) -> None:
 
 @_compiled
 def weigh_bin(_, z, here, there, turn, place, weights, begin, count, out, into):  # type: ignore[no-untyped-def]
-    """Write sums over sixteen rows by some weights, an even number of them, of a bin that is in two places of `lane_transform.transform`."""
+    """Write sums over sixteen rows by some weights, of a bin that is in two places of `lane_transform.transform`.
+
+    The weights are even in number.
+    """
     return _function((z, here, there, turn, place, weights, begin, count, out, into), _weighing)
 
 
@@ -371,9 +385,13 @@ def interpolate(_, picture, first, soon, taps, tap, window, place, rows):  # typ
 
 
 @_compiled
-def mix(_, window, first, rows, basis, begin, out, place):  # type: ignore[no-untyped-def]
-    """Write sixteen weighted sums of the rows of a window, [column, row], by a basis [row, 16], for four columns."""
-    return _function((window, first, rows, basis, begin, out, place), _mixture)
+def mix(_, picture, places, number, rows, mixture, begin, out, targets):  # type: ignore[no-untyped-def]
+    """Write sixteen weighted sums of neighbouring rows of a picture, by a mixture [row, 16], for four places of it.
+
+    `places` and `targets`, int64, say from a number on where the rows begin and where the sums go; the next four places are
+    called for, and may lie anywhere.
+    """
+    return _function((picture, places, number, rows, mixture, begin, out, targets), _mixture)
 
 
 @_compiled
