@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numba
 import numpy as np
 from scipy import ndimage
 
@@ -40,6 +41,7 @@ from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.learning import Learning, Lesson
 from gramoscope.pickup.texture.reading import Evidence, Model, Rules, read, spaced
 from gramoscope.pickup.texture.sharpness import CELL_PX, Sharpness
+from gramoscope.pickup.texture.smoothing import blur, half_bell
 from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.quality import Quality, no_flags
 from gramoscope.signal_path import FrameGroup, Texture, WallTrace
@@ -235,8 +237,7 @@ class TexturePickup:
         sight = sight_of(film)
         stretch, laid = self.stretch(film, sight, self.searched(sight))
         path, found = read(stretch, self.models_for(group.number), self.cartridge.bench.disc.cut, self.cartridge.rules)
-        head, tail = self.strips(laid, film)
-        return replace(self._trace(group, path, found, exposure_flags, sight.step_m), head=head, tail=tail)
+        return self._trace(group, path, found, exposure_flags, sight.step_m, self.strips(laid, film))
 
     def searched(self, sight: Sight) -> Coarse:
         """Return where the coarse search finds both walls, and how sharp each stripe; see `GrooveSearch.find`."""
@@ -335,13 +336,18 @@ class TexturePickup:
         return [lesson.whole if fold is None else lesson.without[fold] for lesson in lessons]
 
     def _trace(
-        self, group: FrameGroup, stretch: Stretch, found: Evidence, exposure_flags: Quality, step_m: FloatArray
+        self,
+        group: FrameGroup,
+        stretch: Stretch,
+        found: Evidence,
+        exposure_flags: Quality,
+        step_m: FloatArray,
+        strips: tuple[Texture | None, Texture | None],
     ) -> WallTrace:
         first = int(np.flatnonzero(group.valid)[0])
         pitch = group.pixel_pitch_m
         place_px, sigma_px = samples_of(stretch, found, self.cartridge.rules)
-        seen = np.isfinite(sigma_px)
-        flags = np.where(seen, np.uint16(exposure_flags), np.uint16(exposure_flags | UNSEEN)).astype(np.uint16)
+        flags = np.isnan(sigma_px) * np.uint16(UNSEEN) | np.uint16(exposure_flags)
         nothing = np.full(place_px.shape, np.nan)
         return WallTrace(
             number=group.number,
@@ -353,6 +359,8 @@ class TexturePickup:
             slope_sigma=nothing,
             correlation_samples=1.0,
             flags=flags,
+            head=strips[0],
+            tail=strips[1],
             frame_step_m=step_m,
             problems=group.problems,
         )
@@ -434,26 +442,53 @@ def samples_of(stretch: Stretch, found: Evidence, rules: Rules) -> tuple[FloatAr
     place_px, sigma_px : float64 arrays, shape (2, sample)
         Displacement from rest; NaN where nothing was read, or is not to be believed.
     """
-    samples = stretch.displacement_px.shape[1] // STRIDE_PX
-
-    def summed(values: FloatArray) -> FloatArray:
-        return np.asarray(values[:, : samples * STRIDE_PX].reshape(2, samples, STRIDE_PX).sum(axis=2))
-
-    information, score = summed(found.information), summed(found.score)
-    moment = summed(found.information * stretch.displacement_px + found.score)
-    known = information > 1e-3 * np.max(information, axis=1, keepdims=True, initial=1e-12)
-    surprise = np.clip(np.nan_to_num(found.surprise, nan=1.0), *SURPRISE_LIMITS)[:, None]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        local = np.where(known, score**2 / (surprise * information), 0.0)
-        seen = known & (_near(local) <= rules.most_local_surprise * _near(known.astype(np.float64)))
-        place = np.where(seen, moment / information, np.nan)
-        sigma = np.where(seen, np.sqrt(surprise / information), np.nan)
+    place, sigma = np.empty((2, 2, stretch.displacement_px.shape[1] // STRIDE_PX))
+    told = found.score, found.information, found.surprise
+    _sample_walls(stretch.displacement_px, told, rules.most_local_surprise, place, sigma)
     return place, sigma
 
 
-def _near(values: FloatArray) -> FloatArray:
-    return np.asarray(ndimage.gaussian_filter1d(values, NEAR_SAMPLES, axis=1, mode="constant"))
+NEAR_BELL = half_bell(3.0)
+"""Over which scores must be what they claim, in samples: some eighty columns."""
 
 
-NEAR_SAMPLES = 3.0
-"""Standard deviation of the bell over which scores must be what they claim: some eighty columns."""
+@numba.njit(cache=True, nogil=True)
+def _sums(path, score, information):  # type: ignore[no-untyped-def]
+    """Return the sums over each sample, of what is told of the path, of the scores and of the information."""
+    sums = np.zeros((3, path.size // STRIDE_PX))
+    for n in range(sums.shape[1]):
+        for x in range(n * STRIDE_PX, (n + 1) * STRIDE_PX):
+            sums[0, n] += information[x] * path[x] + score[x]
+            sums[1, n] += score[x]
+            sums[2, n] += information[x]
+    return sums
+
+
+@numba.njit(cache=True, nogil=True)
+def _sample_walls(path, told, most_local_surprise, place, sigma):  # type: ignore[no-untyped-def]
+    """Write place and standard error of each wall; see `samples_of`."""
+    score, information, surprise = told
+    for wall in range(len(path)):
+        sums = _sums(path[wall], score[wall], information[wall])
+        _sample(sums, surprise[wall], most_local_surprise, place[wall], sigma[wall])
+
+
+@numba.njit(cache=True, nogil=True)
+def _sample(sums, surprise, most_local_surprise, place, sigma):  # type: ignore[no-untyped-def]
+    """Write place and standard error of one wall, of the sums over each sample."""
+    moment, score, information = sums
+    power = 1.0 if np.isnan(surprise) else min(max(surprise, SURPRISE_LIMITS[0]), SURPRISE_LIMITS[1])
+    known, local = np.zeros(place.size), np.zeros(place.size)
+    least = 1e-12
+    for total in information:
+        least = max(least, total)
+    for n in range(place.size):
+        if information[n] > 1e-3 * least:
+            known[n], local[n] = 1.0, score[n] ** 2 / (power * information[n])
+    usual, found = np.empty(place.size), np.empty(place.size)
+    blur(known, NEAR_BELL, 0.0, 0.0, usual)
+    blur(local, NEAR_BELL, 0.0, 0.0, found)
+    for n in range(place.size):
+        seen = known[n] > 0 and found[n] <= most_local_surprise * usual[n]
+        place[n] = moment[n] / information[n] if seen else np.nan
+        sigma[n] = np.sqrt(power / information[n]) if seen else np.nan

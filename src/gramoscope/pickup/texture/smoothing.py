@@ -1,4 +1,4 @@
-"""Smoothing along the groove: nearly a Gaussian, at the same cost for any width.
+"""Smoothing along the groove: nearly a Gaussian, at the same cost for any width; or a narrow one as it is.
 
 Three running means one after the other are a Gaussian to 7 % of its peak (P. Kovesi, Fast almost-Gaussian filtering, DICTA
 2010): their widths are odd numbers whose variances, (w² − 1)/12 each, add up to σ² as nearly as odd numbers can.
@@ -60,3 +60,24 @@ def smoothed(values: FloatArray, sigma: float) -> FloatArray:
     out = np.empty_like(values)
     smooth(values, sigma, out)
     return out
+
+
+def half_bell(sigma: float) -> FloatArray:
+    """Return the taps of a Gaussian of that standard deviation, to four times as far, from its middle on."""
+    reach = int(4 * sigma + 0.5)
+    bell = np.exp(-0.5 / sigma**2 * np.arange(-reach, reach + 1) ** 2)
+    return np.asarray(bell[reach:] / bell.sum())
+
+
+@numba.njit(cache=True, nogil=True)
+def blur(values, bell, before, beyond, out):  # type: ignore[no-untyped-def]
+    """Write one row smoothed by a symmetric filter from its middle on, of what lies before its ends and beyond them."""
+    width, reach = values.size, bell.size - 1
+    wide = np.empty(width + 2 * reach)
+    wide[:reach], wide[reach : reach + width], wide[reach + width :] = before, values, beyond
+    for x in range(width):
+        out[x] = bell[0] * values[x]
+    for k in range(reach, 0, -1):
+        share = bell[k]
+        for x in range(width):
+            out[x] += share * (wide[reach + x - k] + wide[reach + x + k])
