@@ -91,11 +91,13 @@ class Exposure:
         flags : Quality
             `FRAME_LOST` for frames that could not be read, `DARK`, `SATURATED`; none when all frames are good.
         """
-        valid = group.valid.copy()
-        flags = Quality(0) if valid.all() else Quality.FRAME_LOST
-        problems = list(group.problems)
+        flags = Quality(0) if group.valid.all() else Quality.FRAME_LOST
         levels = _levels(group.images, EVERY_ROW, group.white_level)
-        for k in np.flatnonzero(valid & self._faulty(levels, group.white_level)):
+        faulty = group.valid & self._faulty(levels, group.white_level)
+        if not faulty.any():
+            return group, flags
+        valid, problems = group.valid.copy(), list(group.problems)
+        for k in np.flatnonzero(faulty):
             flag, reason = self._fault(levels[k])
             valid[k] = False
             flags |= flag

@@ -280,10 +280,19 @@ def to_phases(shift_px: FloatArray) -> FloatArray:
 
 def frames_in(width: int, shift_px: FloatArray) -> npt.NDArray[np.int64]:
     """Return how many frames of such a width each column of their overlay rests on."""
-    counts = np.zeros(overlay_width(width, shift_px), np.int64)
-    for start, stop, _ in placements(shift_px, width, counts.size)[0]:
-        counts[start:stop] += 1
+    counts = np.empty(overlay_width(width, shift_px), np.int64)
+    _count_frames(shift_px, width, counts)
     return counts
+
+
+@numba.njit(cache=True, nogil=True)
+def _count_frames(shift_px, width, counts):  # type: ignore[no-untyped-def]
+    """Write how many frames cover each column."""
+    counts[:] = 0
+    for k in range(shift_px.size):
+        start, stop, _, _ = placement(shift_px[k], width, counts.size)
+        for x in range(start, stop):
+            counts[x] += 1
 
 
 def overlay_width(width: int, shift_px: FloatArray) -> int:

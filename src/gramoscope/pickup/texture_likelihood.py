@@ -14,7 +14,6 @@ from typing import Any
 
 import numba
 import numpy as np
-from scipy import ndimage
 
 from gramoscope.apparatus.bench import Bench
 from gramoscope.camera.exposure import Exposure
@@ -34,7 +33,7 @@ from gramoscope.pickup.overlay import (
 from gramoscope.pickup.processor import Processor
 from gramoscope.pickup.registration import overlap_textures, strip_columns
 from gramoscope.pickup.texture.calibration import aligned_layout, calibration_of
-from gramoscope.pickup.texture.coarse_path import astray, settled
+from gramoscope.pickup.texture.coarse_path import along_columns, astray, of_walls, settled, silenced
 from gramoscope.pickup.texture.following import TAPS, wide_rows
 from gramoscope.pickup.texture.groove_search import GrooveSearch
 from gramoscope.pickup.texture.layout import StripeLayout
@@ -309,17 +308,7 @@ class TexturePickup:
         frames = frames_in(group.images.shape[2], shift_px)
         usable = frames * 2 >= frames.max()
         read = worth_reading(usable, self.most_columns)
-        x = np.arange(read.start, read.stop)
-        cell: FloatArray = (np.arange(coarse[0].shape[1], dtype=np.float64) + 0.5) * CELL_PX - 0.5
-        path = _by_column(coarse[0], x, cell, smooth_cells=1.5)
-        support = _by_column(coarse[1], x, cell, smooth_cells=SUPPORT_CELLS)
-        walls = np.array([support[self.layout.wall == wall].max(axis=0, initial=0.0) for wall in (INNER, OUTER)])
-        cut, rules = self.cartridge.bench.disc.cut, self.cartridge.rules
-        lost = astray(path, walls, cut, least_support=rules.least_support) | (
-            walls.max(axis=0) < rules.least_best_support
-        )
-        support = np.where(lost[self.layout.wall], 0.0, support)
-        path = settled(path, np.where(lost, 0.0, walls), cut, smooth_px=rules.smooth_other_px)
+        path, support = self._believed(coarse, read)
         rows = np.full((self.layout.wall.size, width), np.nan)
         rows[:, read] = self.layout.rows(path)
         ends = strip_columns(group, width=width, group_step_m=self.cartridge.bench.sequence.group_step_m)
@@ -328,6 +317,15 @@ class TexturePickup:
         columns = laid.columns[read]
         burnt = device.places_brighter(columns, NEARLY_WHITE * group.white_level)
         return Stretch(columns, usable[read], burnt, path, support, device=device, first_column=read.start), laid
+
+    def _believed(self, coarse: Coarse, read: slice) -> Coarse:
+        """Return paths and support of some columns, as far as they can be believed."""
+        wall, cut, rules = self.layout.wall, self.cartridge.bench.disc.cut, self.cartridge.rules
+        path = along_columns(coarse[0], read, cell_px=CELL_PX, half_bell=PATH_BELL)
+        support = along_columns(coarse[1], read, cell_px=CELL_PX, half_bell=SUPPORT_BELL)
+        lost = astray(path, of_walls(support, wall), cut, least_support=rules.least_support)
+        support = silenced(support, lost, wall, least_best_support=rules.least_best_support)
+        return settled(path, of_walls(support, wall), cut, smooth_px=rules.smooth_other_px), support
 
     def models_for(self, number: int) -> list[Model]:
         """Return the models by which a group is read, round by round: none that the group itself has taught."""
@@ -409,24 +407,35 @@ def tiles_to_draw(
         Of the windows.
     """
     shown = layout.visible(rows, half_px=half_px - WANDER_PX)
-    seen = (rows >= layout.first_row[:, None]) & (rows <= layout.last_row[:, None])
     for end in ends:
-        if shown[:, end].any(axis=0).mean() < 0.5:
-            shown[:, end] = seen[:, end]
+        _show_end(rows[:, end], layout.seen_between, shown[:, end])
     wanted = tiles_about(np.where(shown, rows, np.nan), shape, reach_px=wide_rows(half_px) / 2 + TAPS / 2 + WANDER_PX)
     for end in ends:
-        tiles = slice(end.start // TILE_COLUMNS, -(-end.stop // TILE_COLUMNS))
-        wanted[:, tiles] = wanted[:, tiles].any(axis=1, keepdims=True)
+        _join(wanted[:, end.start // TILE_COLUMNS : -(-end.stop // TILE_COLUMNS)])
     return wanted
 
 
-def _by_column(cells: FloatArray, x: IntArray, cell: FloatArray, *, smooth_cells: float) -> FloatArray:
-    smooth = ndimage.gaussian_filter1d(cells, smooth_cells, axis=1, mode="nearest")
-    return np.array([np.interp(x, cell, one) for one in smooth])
+@numba.njit(cache=True, nogil=True)
+def _show_end(rows, limits, shown):  # type: ignore[no-untyped-def]
+    """Show stripes, [stripe, column], wherever they are in sight, if in most columns none can be read."""
+    columns = 0
+    for x in range(rows.shape[1]):
+        columns += shown[:, x].any()
+    if 2 * columns < rows.shape[1]:
+        for i in range(rows.shape[0]):
+            for x in range(rows.shape[1]):
+                shown[i, x] = limits[0, i] <= rows[i, x] <= limits[1, i]
 
 
-SUPPORT_CELLS = 4.0
-"""Smoothing of the support: one cell of texture is a poor witness."""
+@numba.njit(cache=True, nogil=True)
+def _join(wanted):  # type: ignore[no-untyped-def]
+    """Want all tiles of a row of which one is wanted."""
+    for row in wanted:
+        row[:] = row.any()
+
+
+PATH_BELL, SUPPORT_BELL = half_bell(1.5), half_bell(4.0)
+"""Smoothing of paths and support, over cells: one cell of texture is a poor witness."""
 UNSEEN = Quality.NO_STRIPE | Quality.INTERPOLATED
 UNTAUGHT = "too little of the stripes is seen to learn their texture; the recipe seed-paper reads single groups"
 

@@ -7,12 +7,12 @@ something beside it that is as sharp, as the floor of a fracture may be; and wha
 
 from __future__ import annotations
 
+import numba
 import numpy as np
-from scipy import ndimage
 
-from gramoscope.conventions import INNER, OUTER, BoolArray, FloatArray
+from gramoscope.conventions import INNER, OUTER, BoolArray, FloatArray, IntArray
 from gramoscope.disc.formats import Cut
-from gramoscope.pickup.texture.smoothing import smoothed
+from gramoscope.pickup.texture.smoothing import blur, smooth
 
 MOST_PARTED_PX = 7.0
 """Further than this from their usual distance, in rows, walls are not: one of the paths has gone astray."""
@@ -25,6 +25,87 @@ LEAST_JUDGED_COLUMNS = 100
 def sign_of(cut: Cut) -> FloatArray:
     """Return how the walls move when the groove moves in the direction of its cut, lateral or vertical; shape (2,)."""
     return np.array([1.0, 1.0] if cut == "lateral" else [-1.0, 1.0])
+
+
+def along_columns(cells: FloatArray, columns: slice, *, cell_px: int, half_bell: FloatArray) -> FloatArray:
+    """Return what was found cell by cell, smoothed and drawn column by column, on straight lines between their middles.
+
+    Parameters
+    ----------
+    cells : float64 array, shape (line, cell)
+    columns : slice
+        Which columns are drawn; the first cell begins with column 0. Beyond the middles of the outermost cells their
+        values are held.
+    cell_px : int
+        Columns of a cell.
+    half_bell : float64 array
+        Of the smoothing over cells, from its middle on.
+
+    Returns
+    -------
+    float64 array, shape (line, column)
+    """
+    drawn = np.empty((len(cells), columns.stop - columns.start))
+    _draw_along(cells, columns.start, cell_px, half_bell, drawn)
+    return drawn
+
+
+@numba.njit(cache=True, nogil=True)
+def _draw_along(cells, first, cell_px, half_bell, drawn):  # type: ignore[no-untyped-def]
+    """Write lines by column; see `along_columns`."""
+    last = cells.shape[1] - 1
+    smooth_cells = np.empty(last + 1)
+    for i in range(len(cells)):
+        blur(cells[i], half_bell, cells[i, 0], cells[i, last], smooth_cells)
+        for k in range(drawn.shape[1]):
+            place = first + k - (0.5 * cell_px - 0.5)
+            cell = min(max(int(np.floor(place / cell_px)), 0), max(last - 1, 0))
+            near, far = smooth_cells[cell], smooth_cells[min(cell + 1, last)]
+            beyond = min(max(place - cell * cell_px, 0.0), 1.0 * cell_px)
+            drawn[i, k] = (far - near) / cell_px * beyond + near
+
+
+def of_walls(support: FloatArray, wall: IntArray) -> FloatArray:
+    """Return the support of each wall, shape (2, column): that of its best stripe, 0 without any."""
+    best = np.zeros((2, support.shape[1]))
+    _raise_walls(support, wall, best)
+    return best
+
+
+@numba.njit(cache=True, nogil=True)
+def _raise_walls(support, wall, best):  # type: ignore[no-untyped-def]
+    for i in range(wall.size):
+        for x in range(support.shape[1]):
+            best[wall[i], x] = max(best[wall[i], x], support[i, x])
+
+
+def silenced(support: FloatArray, lost: BoolArray, wall: IntArray, *, least_best_support: float) -> FloatArray:
+    """Return the support of stripes, 0 where it is not believed.
+
+    Parameters
+    ----------
+    support : float64 array, shape (stripe, column)
+    lost : bool array, shape (2, column)
+        Where each wall is astray.
+    wall : int64 array, shape (stripe,)
+    least_best_support : float
+        Where no stripe at all has that much none is believed.
+    """
+    left = np.zeros_like(support)
+    _let_speak(support, lost, wall, least_best_support, left)
+    return left
+
+
+@numba.njit(cache=True, nogil=True)
+def _let_speak(support, lost, wall, least_best_support, left):  # type: ignore[no-untyped-def]
+    """Write the support that is believed; see `silenced`."""
+    for x in range(support.shape[1]):
+        best = 0.0
+        for i in range(wall.size):
+            best = max(best, support[i, x])
+        for i in range(wall.size):
+            if best >= least_best_support and not lost[wall[i], x]:
+                left[i, x] = support[i, x]
 
 
 def astray(displacement_px: FloatArray, support: FloatArray, cut: Cut, *, least_support: float) -> BoolArray:
@@ -47,16 +128,30 @@ def astray(displacement_px: FloatArray, support: FloatArray, cut: Cut, *, least_
     bool array, shape (2, column)
     """
     lost = np.zeros(displacement_px.shape, np.bool_)
-    seen = (support > least_support).all(axis=0)
-    if cut == "stereo" or seen.sum() < LEAST_JUDGED_COLUMNS:
-        return lost
-    inner, outer = sign_of(cut)[:, np.newaxis] * displacement_px
-    parted = seen & (np.abs(outer - inner - np.median((outer - inner)[seen])) > MOST_PARTED_PX)
-    for (part,) in ndimage.find_objects(ndimage.label(parted)[0]):
-        if part.stop - part.start >= LEAST_PARTED_COLUMNS:
-            weaker = int(np.argmin(support[:, part].mean(axis=1)))
-            lost[weaker, max(part.start - LEAST_PARTED_COLUMNS, 0) : part.stop + LEAST_PARTED_COLUMNS] = True
+    if cut != "stereo":
+        _part(displacement_px, support, sign_of(cut), least_support, lost)
     return lost
+
+
+@numba.njit(cache=True, nogil=True)
+def _part(displacement, support, sign, least_support, lost):  # type: ignore[no-untyped-def]
+    """Mark the walls that are astray; see `astray`."""
+    width = displacement.shape[1]
+    apart, judged, count = np.empty(width), np.empty(width), 0
+    for x in range(width):
+        apart[x] = np.nan
+        if support[INNER, x] > least_support and support[OUTER, x] > least_support:
+            apart[x] = judged[count] = sign[OUTER] * displacement[OUTER, x] - sign[INNER] * displacement[INNER, x]
+            count += 1
+    if count < LEAST_JUDGED_COLUMNS:
+        return
+    usual, start = np.median(judged[:count]), 0
+    for x in range(width + 1):
+        if x == width or not abs(apart[x] - usual) > MOST_PARTED_PX:
+            if x - start >= LEAST_PARTED_COLUMNS:
+                weaker = INNER if support[INNER, start:x].sum() <= support[OUTER, start:x].sum() else OUTER
+                lost[weaker, max(start - LEAST_PARTED_COLUMNS, 0) : x + LEAST_PARTED_COLUMNS] = True
+            start = x + 1
 
 
 def settled(displacement_px: FloatArray, support: FloatArray, cut: Cut, *, smooth_px: float) -> FloatArray:
@@ -74,12 +169,27 @@ def settled(displacement_px: FloatArray, support: FloatArray, cut: Cut, *, smoot
     """
     if cut == "stereo":
         return displacement_px
-    sign = sign_of(cut)[:, np.newaxis]
-    signed = sign * displacement_px
-    weight = support**2 + 1e-4
-    inner, outer = weight
-    both = inner * outer / (inner + outer)
-    apart = smoothed(both * (signed[OUTER] - signed[INNER]) / 2, smooth_px)
-    apart = apart / smoothed(both, smooth_px)
-    middle = (weight * (signed + np.array([[1.0], [-1.0]]) * apart)).sum(axis=0) / weight.sum(axis=0)
-    return np.asarray(sign * (middle + np.array([[-1.0], [1.0]]) * apart))
+    path = np.empty_like(displacement_px)
+    _settle(displacement_px, support, sign_of(cut), float(smooth_px), path)
+    return path
+
+
+@numba.njit(cache=True, nogil=True)
+def _settle(displacement, support, sign, smooth_px, path):  # type: ignore[no-untyped-def]
+    """Write paths that differ smoothly; see `settled`."""
+    width = displacement.shape[1]
+    both, apart = np.empty(width), np.empty(width)
+    for x in range(width):
+        inner, outer = support[INNER, x] ** 2 + 1e-4, support[OUTER, x] ** 2 + 1e-4
+        both[x] = inner * outer / (inner + outer)
+        apart[x] = both[x] * (sign[OUTER] * displacement[OUTER, x] - sign[INNER] * displacement[INNER, x]) / 2
+    weight, half = np.empty(width), np.empty(width)
+    smooth(both, smooth_px, weight)
+    smooth(apart, smooth_px, half)
+    for x in range(width):
+        inner, outer = support[INNER, x] ** 2 + 1e-4, support[OUTER, x] ** 2 + 1e-4
+        aside = half[x] / weight[x]
+        said = inner * (sign[INNER] * displacement[INNER, x] + aside)
+        said += outer * (sign[OUTER] * displacement[OUTER, x] - aside)
+        middle = said / (inner + outer)
+        path[INNER, x], path[OUTER, x] = sign[INNER] * (middle - aside), sign[OUTER] * (middle + aside)

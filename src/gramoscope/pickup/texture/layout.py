@@ -10,6 +10,7 @@ ends where its wall does: when the groove rises, its bottom lifts the lowest str
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numba
 import numpy as np
@@ -68,7 +69,7 @@ class StripeLayout:
             bench.disc.groove_width_m / 2 / bench.sensor.pixel_pitch_m,
         )
 
-    @property
+    @cached_property
     def from_bottom_px(self) -> FloatArray:
         """How far from the middle of the groove each stripe lies at rest, shape (stripe,)."""
         return np.where(self.wall == INNER, self.rest_row - self.middle_row, self.middle_row - self.rest_row)
@@ -108,14 +109,21 @@ class StripeLayout:
         They must lie in the half of the picture that is sharp there, above the groove's rounded bottom, below the land.
         """
         seen = np.ones(rows.shape, np.bool_)
-        # the groove's middle moves as the walls do in the mean, of which one stripe each tells
-        first = [np.flatnonzero(self.wall == wall)[:1] for wall in (INNER, OUTER)]
-        known = np.concatenate(first)
-        moved = (rows[known] - self.rest_row[known, None]).mean(axis=0) if known.size else np.zeros(rows.shape[1])
-        see(rows, self.middle_row + moved, self.wall, self.seen_between, self.on_wall_px(half_px), float(half_px), seen)
+        see(rows, self.middle_of(rows), self.wall, self.seen_between, self.on_wall_px(half_px), float(half_px), seen)
         return seen
 
-    @property
+    def middle_of(self, rows: FloatArray) -> FloatArray:
+        """Return the row of the groove's middle, shape (place,): it moves as the walls do in the mean."""
+        middle = np.empty(rows.shape[1])
+        _follow_middle(rows, self.rest_row, self._tellers, self.middle_row, middle)
+        return middle
+
+    @cached_property
+    def _tellers(self) -> IntArray:
+        """One stripe of each wall that there is, which tells how it moves."""
+        return np.concatenate([np.flatnonzero(self.wall == wall)[:1] for wall in (INNER, OUTER)])
+
+    @cached_property
     def seen_between(self) -> FloatArray:
         """First and last row of each stripe, shape (2, stripe)."""
         return np.array([self.first_row, self.last_row])
@@ -123,6 +131,16 @@ class StripeLayout:
     def on_wall_px(self, half_px: float) -> tuple[float, float]:
         """Return how near to the groove's middle, and how far from it, windows of ± `half_px` rows show a wall."""
         return BOTTOM_PX + half_px, self.half_width_px - half_px
+
+
+@numba.njit(cache=True, nogil=True)
+def _follow_middle(rows, rest_row, tellers, middle_row, middle):  # type: ignore[no-untyped-def]
+    """Write where the middle of the groove runs, by the stripes that tell."""
+    for x in range(middle.size):
+        moved = 0.0
+        for i in tellers:
+            moved += rows[i, x] - rest_row[i]
+        middle[x] = middle_row + moved / max(tellers.size, 1)
 
 
 @numba.njit(cache=True, nogil=True)
