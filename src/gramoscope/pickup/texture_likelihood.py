@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numba
@@ -253,12 +254,12 @@ class TexturePickup:
             texture_of=lambda columns: slope_along(film.device.part(laid.columns, columns)),
         )
 
-    @property
+    @cached_property
     def taught(self) -> bool:
         """Whether the passage was long enough to learn the texture of a stripe at least."""
         return any(stripe is not None for lesson in self.lessons[-1:] for stripe in lesson.whole.stripes)
 
-    @property
+    @cached_property
     def most_columns(self) -> int:
         """So many columns of a stretch are read: as many as the passage's transforms hold, and room between its ends."""
         lengths = [lesson.whole.length for lesson in self.lessons]

@@ -24,7 +24,10 @@ LEAST_JUDGED_COLUMNS = 100
 
 def sign_of(cut: Cut) -> FloatArray:
     """Return how the walls move when the groove moves in the direction of its cut, lateral or vertical; shape (2,)."""
-    return np.array([1.0, 1.0] if cut == "lateral" else [-1.0, 1.0])
+    return LATERAL if cut == "lateral" else VERTICAL
+
+
+LATERAL, VERTICAL = np.array([1.0, 1.0]), np.array([-1.0, 1.0])
 
 
 def along_columns(cells: FloatArray, columns: slice, *, cell_px: int, half_bell: FloatArray) -> FloatArray:

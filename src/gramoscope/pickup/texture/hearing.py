@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numba
 import numpy as np
@@ -17,7 +17,7 @@ import numpy as np
 from gramoscope.conventions import INNER, OUTER, BoolArray, Float32Array, FloatArray, IntArray
 from gramoscope.pickup.texture.following import REACH, STEPS, step_mixtures, step_of, wide_rows
 from gramoscope.pickup.texture.lane_transform import PAIR, fold, let_through, plan_for, transform
-from gramoscope.pickup.texture.layout import StripeLayout, see
+from gramoscope.pickup.texture.layout import StripeLayout, see_stripe
 from gramoscope.pickup.texture.likelihood import (
     LOUDNESS_BELL,
     TAPER,
@@ -83,6 +83,18 @@ class Ear:
         """What makes channels of the picture's rows, step by step, what is usual and the filters; of sixteen channels."""
         mixtures = [step_mixtures(basis) for basis in _in_lanes(self.basis, (2,))]
         return _stacked(mixtures, 3), _in_lanes(self.usual, (1,)), _in_lanes(self.filters, (3,))
+
+    @cached_property
+    def for_listening(self) -> tuple[tuple[Float32Array | FloatArray, ...], tuple[Any, ...], int]:
+        """What `_listen` needs of an ear: its weights, the plan of its transforms, and the first bin of its band."""
+        plan = plan_for(self.length)
+        weights = (self.half_taps, *self.in_lanes, self.sign, self.mean_score, self.trust)
+        return weights, (plan.radix, plan.twiddle, plan.turn), self.band.bins(self.length).start
+
+    @cached_property
+    def trusted_information(self) -> FloatArray:
+        """I²/J of one column, shape (stripe,)."""
+        return self.trust * self.information
 
 
 def ear_of(
@@ -150,9 +162,10 @@ def clear_columns(
     clear = np.empty(rows.shape, np.bool_)
     _clear(
         stretch.displacement_px,
-        (layout.rest_row[number], layout.wall[number], layout.seen_between[:, number], layout.middle_row),
+        number,
+        (layout.rest_row, layout.wall, layout.seen_between, layout.middle_row),
         (float(half_px), layout.on_wall_px(half_px), float(least_support)),
-        (stretch.usable, stretch.burnt, stretch.support[number]),
+        (stretch.usable, stretch.burnt, stretch.support),
         rows,
         clear,
     )
@@ -160,7 +173,7 @@ def clear_columns(
 
 
 @numba.njit(cache=True, nogil=True)
-def _clear(displacement, stripes, needed, picture, rows, clear):  # type: ignore[no-untyped-def]
+def _clear(displacement, number, stripes, needed, picture, rows, clear):  # type: ignore[no-untyped-def]
     """Write where stripes run, and which columns are seen whole, usable, supported and not burnt."""
     rest_row, wall, limits, middle_row = stripes
     half_px, from_middle, least_support = needed
@@ -168,11 +181,11 @@ def _clear(displacement, stripes, needed, picture, rows, clear):  # type: ignore
     middle = np.empty(usable.size)
     for x in range(usable.size):
         middle[x] = middle_row + 0.5 * (displacement[INNER, x] + displacement[OUTER, x])
-    for i in range(rest_row.size):
+    for i, stripe in enumerate(number):
         for x in range(usable.size):
-            rows[i, x] = rest_row[i] + displacement[wall[i], x]
-            clear[i, x] = usable[x] and support[i, x] >= least_support
-    see(rows, middle, wall, limits, from_middle, half_px, clear)
+            rows[i, x] = rest_row[stripe] + displacement[wall[stripe], x]
+            clear[i, x] = usable[x] and support[stripe, x] >= least_support
+        see_stripe(rows[i], middle, wall[stripe], limits[:, stripe], from_middle, half_px, clear[i])
     if len(burnt) > 0:
         _burn(burnt, rows, half_px, clear)
 
@@ -389,17 +402,5 @@ def heard(
         0 … 1.
     """
     weight, said = np.empty(rows.shape, np.float32), np.empty(rows.shape)
-    plan = plan_for(ear.length)
-    _listen(
-        columns,
-        rows,
-        clear,
-        ear.half_px,
-        (ear.half_taps, *ear.in_lanes, ear.sign, ear.mean_score, ear.trust),
-        (plan.radix, plan.twiddle, plan.turn),
-        ear.band.bins(ear.length).start,
-        power_limits,
-        said,
-        weight,
-    )
+    _listen(columns, rows, clear, ear.half_px, *ear.for_listening, power_limits, said, weight)
     return said, weight

@@ -109,7 +109,7 @@ class StripeLayout:
         They must lie in the half of the picture that is sharp there, above the groove's rounded bottom, below the land.
         """
         seen = np.ones(rows.shape, np.bool_)
-        see(rows, self.middle_of(rows), self.wall, self.seen_between, self.on_wall_px(half_px), float(half_px), seen)
+        _see(rows, self.middle_of(rows), self.wall, self.seen_between, self.on_wall_px(half_px), float(half_px), seen)
         return seen
 
     def middle_of(self, rows: FloatArray) -> FloatArray:
@@ -144,15 +144,21 @@ def _follow_middle(rows, rest_row, tellers, middle_row, middle):  # type: ignore
 
 
 @numba.njit(cache=True, nogil=True)
-def see(rows, middle, wall, limits, from_middle, half_px, seen):  # type: ignore[no-untyped-def]
+def _see(rows, middle, wall, limits, from_middle, half_px, seen):  # type: ignore[no-untyped-def]
     """Take away what windows about stripes, [stripe, column], do not see whole, of a groove with its middle in some rows."""
     for i in range(rows.shape[0]):
-        side = 1.0 if wall[i] == INNER else -1.0
-        low, high = limits[0, i] + half_px, limits[1, i] - half_px
-        for x in range(rows.shape[1]):
-            away = side * (rows[i, x] - middle[x])
-            inside = (rows[i, x] >= low) & (rows[i, x] <= high)
-            seen[i, x] &= inside & (away >= from_middle[0]) & (away <= from_middle[1])
+        see_stripe(rows[i], middle, wall[i], limits[:, i], from_middle, half_px, seen[i])
+
+
+@numba.njit(cache=True, nogil=True)
+def see_stripe(row, middle, wall, limits, from_middle, half_px, seen):  # type: ignore[no-untyped-def]
+    """Take away what windows about one stripe do not see whole."""
+    side = 1.0 if wall == INNER else -1.0
+    low, high = limits[0] + half_px, limits[1] - half_px
+    for x in range(row.size):
+        away = side * (row[x] - middle[x])
+        inside = (row[x] >= low) & (row[x] <= high)
+        seen[x] &= inside & (away >= from_middle[0]) & (away <= from_middle[1])
 
 
 def _all_stripes(bench: Bench) -> tuple[Stripe, ...]:

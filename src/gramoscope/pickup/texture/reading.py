@@ -150,20 +150,23 @@ class Rules:
     momentum: float = 0.3
 
 
+UNJUDGED: FloatArray = np.full(2, np.nan)
+
+
 def evidence(stretch: Stretch, model: Model, rules: Rules, *, judged: bool = True) -> Evidence:
     """Return what all stripes say about the present path of both walls, and whether that surprises, if it is to be judged."""
     ear, seen = model.ear, stretch.in_tone(model.tone)
-    score, information = np.zeros((2, 2, seen.columns.shape[0]))
-    if not ear.number.size:
-        return Evidence(score, information, np.full(2, np.nan))
     columns = seen.columns.shape[0]
+    score, information = np.zeros((2, 2, columns))
+    if not ear.number.size:
+        return Evidence(score, information, UNJUDGED)
     require(columns <= ear.length, f"a stretch of {columns} columns", f"at most {ear.length}, as the passage taught")
     rows, clear = clear_columns(seen, model.layout, ear.number, half_px=ear.half_px, least_support=rules.least_support)
     aside = np.empty_like(rows)
     stepped(rows, aside)
     said, weight = seen.device.heard(ear, seen.columns, rows, clear, power_limits=rules.power_limits)
-    add_up(said, weight, aside, ear.wall, ear.trust * ear.information, score, information)
-    return Evidence(score, information, _surprise(ear, said, weight) if judged else np.full(2, np.nan))
+    add_up(said, weight, aside, ear.wall, ear.trusted_information, score, information)
+    return Evidence(score, information, _surprise(ear, said, weight) if judged else UNJUDGED)
 
 
 def _surprise(ear: Ear, said: FloatArray, weight: Float32Array) -> FloatArray:
@@ -242,15 +245,24 @@ def _step_together(score, information, sign, limits, smooth_other_px, moved):  #
 
 def read(stretch: Stretch, models: Sequence[Model], cut: Cut, rules: Rules) -> tuple[Stretch, Evidence]:
     """Return the stretch with its path improved by one round with each model, and the evidence about that path."""
-    seen = stretch
-    move: FloatArray = np.zeros(())
+    begun = seen = replace(stretch, displacement_px=stretch.displacement_px.copy())
+    path = seen.displacement_px
+    move = np.zeros_like(path)
     for model in models:
         if seen.tone != model.tone:
-            seen = replace(stretch, displacement_px=seen.displacement_px).in_tone(model.tone)
+            seen = begun.in_tone(model.tone)
         # scores answer less to a path that is far off, and what was missing before is mostly missing still
-        move = rules.gain * step(evidence(seen, model, rules, judged=False), cut, rules) + rules.momentum * move
-        seen = seen.moved(move)
+        _go_on(step(evidence(seen, model, rules, judged=False), cut, rules), rules.gain, rules.momentum, move, path)
     return seen, evidence(seen, models[-1], rules)
+
+
+@numba.njit(cache=True, nogil=True)
+def _go_on(step, gain, momentum, move, path):  # type: ignore[no-untyped-def]
+    """Move paths by a step and some of the move before."""
+    for wall in range(len(path)):
+        for x in range(path.shape[1]):
+            move[wall, x] = gain * step[wall, x] + momentum * move[wall, x]
+            path[wall, x] += move[wall, x]
 
 
 def spaced(count: int, rounds: int) -> list[int]:
