@@ -10,7 +10,9 @@ from gramoscope.pickup.overlay import (
     TILE_COLUMNS,
     TILE_ROWS,
     all_tiles,
+    frames_in,
     overlay,
+    overlay_width,
     slope_along,
     tiles_about,
     to_phases,
@@ -36,6 +38,13 @@ def test_the_mean_is_that_of_the_canvas(dtype: type, height: int, shift_px: np.n
     np.testing.assert_allclose(laid.columns.T, canvas.mean, rtol=2e-6, atol=1e-4 * np.iinfo(dtype).max / 255)
     np.testing.assert_array_equal(laid.frames, canvas.frames)
     assert laid.columns.flags.c_contiguous
+
+
+def test_frames_are_counted_where_all_taps_of_their_interpolation_lie() -> None:
+    x = np.arange(overlay_width(61, SHIFT_PX))
+    # columns from −1 to +2 about the place in the frame
+    first = [np.floor(x - shift) - 1 for shift in SHIFT_PX]
+    np.testing.assert_array_equal(frames_in(61, SHIFT_PX), sum((one >= 0) & (one + 3 <= 60) for one in first))
 
 
 def test_phases_are_few_and_shifts_right_in_the_mean() -> None:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from gramoscope.apparatus.bench import Bench, Sequence
 from gramoscope.conventions import INNER, OUTER
@@ -66,6 +67,27 @@ def test_error_bars_are_true_when_scores_are() -> None:
         place, sigma = samples_of(_stretch(np.full((2, WIDTH), 4.0)), _evidence(rng, information), everything)
         z.append((place - 4.0) / sigma)
     assert np.std(z) == pytest.approx(1, abs=0.04)
+
+
+def test_samples_are_what_plain_sums_make_of_them() -> None:
+    rng = np.random.default_rng(9)
+    path, information = rng.normal(5, 1, (2, WIDTH)), rng.uniform(0.5, 3, (2, WIDTH))
+    information[0, 80:120] = 0
+    found = replace(_evidence(rng, information), surprise=np.array([1.4, 0.1]))
+    found.score[1, 120:170] += 3.0
+    place, sigma = samples_of(_stretch(path), found, RULES)
+    moment, score, known = (
+        one[:, : WIDTH // STRIDE_PX * STRIDE_PX].reshape(2, -1, STRIDE_PX).sum(axis=2)
+        for one in (information * path + found.score, found.score, information)
+    )
+    usual = np.array([[1.4], [0.7]])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        local = [np.where(known > 0, score**2 / (usual * known), 0.0), (known > 0).astype(float)]
+        power, samples = (ndimage.gaussian_filter1d(one, 3.0, axis=1, mode="constant") for one in local)
+        seen = (known > 0) & (power <= RULES.most_local_surprise * samples)
+        assert 0 < np.count_nonzero(~seen[1]) < seen.shape[1]
+        np.testing.assert_allclose(place, np.where(seen, moment / known, np.nan), rtol=1e-12)
+        np.testing.assert_allclose(sigma, np.where(seen, np.sqrt(usual / known), np.nan), rtol=1e-12)
 
 
 def test_a_wall_that_nobody_saw_has_no_place() -> None:

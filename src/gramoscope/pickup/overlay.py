@@ -253,8 +253,11 @@ def placements(shift_px, width, canvas_width):  # type: ignore[no-untyped-def]
 
 def sum_type(images: ImageArray) -> type[np.uint16] | type[np.uint32]:
     """Return the narrowest whole numbers that hold the sum of all frames."""
-    small = images.dtype == np.uint8 and len(images) <= np.iinfo(np.uint16).max // np.iinfo(np.uint8).max
-    return np.uint16 if small else np.uint32
+    return np.uint16 if images.dtype == np.uint8 and len(images) <= FRAMES_IN_16_BITS else np.uint32
+
+
+FRAMES_IN_16_BITS = (2**16 - 1) // (2**8 - 1)
+"""The sum of so many frames of eight bits has no more than sixteen."""
 
 
 PHASES = 4

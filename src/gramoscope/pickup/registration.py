@@ -355,12 +355,27 @@ def expected_steps_px(group: FrameGroup) -> FloatArray:
 
 def added_up(group: FrameGroup, expected_px: FloatArray, found_px: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return what `frame_shifts` does, of the steps that were expected and found (or NaN) between valid frames."""
-    index = np.flatnonzero(group.valid)
-    shift_px = np.concatenate([[0.0], np.cumsum(np.where(np.isnan(found_px), expected_px, found_px))])
-    step_m = np.full(max(group.images.shape[0] - 1, 0), np.nan)
-    neighbours = np.diff(index) == 1
-    step_m[index[:-1][neighbours]] = found_px[neighbours] * group.pixel_pitch_m
+    shift_px, step_m = np.empty(expected_px.size + 1), np.empty(max(group.images.shape[0] - 1, 0))
+    _add_steps(group.valid, expected_px, found_px, group.pixel_pitch_m, shift_px, step_m)
     return shift_px, step_m
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_steps(valid, expected_px, found_px, pitch_m, shift_px, step_m):  # type: ignore[no-untyped-def]
+    """Write where the valid frames lie, and the steps between neighbours of which both are valid."""
+    seen = 0
+    for frame in range(valid.size):
+        if frame < step_m.size:
+            step_m[frame] = np.nan
+        if valid[frame]:
+            if seen == 0:
+                shift_px[0] = 0.0
+            else:
+                step = found_px[seen - 1]
+                shift_px[seen] = shift_px[seen - 1] + (expected_px[seen - 1] if np.isnan(step) else step)
+                if valid[frame - 1]:
+                    step_m[frame - 1] = step * pitch_m
+            seen += 1
 
 
 def registered(group: FrameGroup) -> tuple[Canvas, FloatArray]:

@@ -18,7 +18,7 @@ import numpy as np
 
 from gramoscope.apparatus.bench import Bench
 from gramoscope.camera.exposure import Exposure
-from gramoscope.conventions import INNER, OUTER, BoolArray, FloatArray, IntArray
+from gramoscope.conventions import INNER, BoolArray, FloatArray, IntArray
 from gramoscope.errors import require
 from gramoscope.pickup.cartridge import Line, Sketch, Spread
 from gramoscope.pickup.device import Device, Film

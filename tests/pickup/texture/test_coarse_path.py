@@ -4,10 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from gramoscope.conventions import INNER, OUTER, FloatArray
 from gramoscope.disc.formats import Cut
-from gramoscope.pickup.texture.coarse_path import LEAST_PARTED_COLUMNS, MOST_PARTED_PX, astray, settled
+from gramoscope.pickup.texture.coarse_path import (
+    LEAST_PARTED_COLUMNS,
+    MOST_PARTED_PX,
+    along_columns,
+    astray,
+    of_walls,
+    settled,
+    silenced,
+)
+from gramoscope.pickup.texture.smoothing import half_bell
 
 WIDTH = 800
 COLUMN = np.arange(WIDTH)
@@ -90,3 +100,24 @@ def test_nobody_is_astray_where_one_wall_alone_is_seen_or_both_are_driven() -> N
     support[OUTER, 280:] = 0.1
     assert not astray(path, support, "lateral", least_support=SEEN).any()
     assert not astray(path[:, 300:390], support[:, :90], "lateral", least_support=SEEN).any()
+
+
+@pytest.mark.parametrize("cells", [1, 2, 40])
+@pytest.mark.parametrize("columns", [slice(0, 327), slice(16, 301)])
+def test_cells_are_joined_by_straight_lines_between_their_middles(cells: int, columns: slice) -> None:
+    found = np.random.default_rng(4).normal(size=(3, cells))
+    drawn = along_columns(found, columns, cell_px=8, half_bell=half_bell(1.5))
+    middle, x = (np.arange(cells) + 0.5) * 8 - 0.5, np.arange(columns.start, columns.stop)
+    smooth = ndimage.gaussian_filter1d(found, 1.5, axis=1, mode="nearest")
+    np.testing.assert_allclose(drawn, [np.interp(x, middle, one) for one in smooth], rtol=1e-12, atol=1e-14)
+
+
+def test_a_wall_is_as_sharp_as_its_best_stripe_and_silent_where_it_is_lost() -> None:
+    rng, wall = np.random.default_rng(5), np.array([OUTER, OUTER, INNER])
+    support, lost = rng.uniform(0, 0.6, (3, WIDTH)), rng.uniform(size=(2, WIDTH)) < 0.2
+    np.testing.assert_array_equal(of_walls(support, wall), [support[2], support[:2].max(axis=0)])
+    np.testing.assert_array_equal(of_walls(support[:2], wall[:2])[INNER], 0.0)
+    left = silenced(support, lost, wall, least_best_support=0.25)
+    faint = support.max(axis=0) < 0.25
+    assert 0 < faint.sum() < WIDTH
+    np.testing.assert_array_equal(left, np.where(lost[wall] | faint, 0.0, support))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from gramoscope.pickup.texture.smoothing import half_widths, smoothed
+from gramoscope.pickup.texture.smoothing import blur, half_bell, half_widths, smoothed
 
 VALUES = np.cumsum(np.random.default_rng(2).normal(size=800)) + 3
 
@@ -34,3 +34,13 @@ def test_beyond_the_ends_the_last_value_is_held(sigma: float) -> None:
 
 def test_what_is_narrower_than_a_column_stays_as_it_is() -> None:
     np.testing.assert_allclose(smoothed(VALUES, 0.2), VALUES)
+
+
+@pytest.mark.parametrize("sigma", [1.5, 3.0, 4.0])
+@pytest.mark.parametrize("width", [5, 800])
+def test_a_narrow_gaussian_is_the_gaussian(sigma: float, width: int) -> None:
+    values, out = VALUES[:width], np.empty(width)
+    blur(values, half_bell(sigma), values[0], values[-1], out)
+    np.testing.assert_allclose(out, ndimage.gaussian_filter1d(values, sigma, mode="nearest"), rtol=1e-12)
+    blur(values, half_bell(sigma), 0.0, 0.0, out)
+    np.testing.assert_allclose(out, ndimage.gaussian_filter1d(values, sigma, mode="constant"), rtol=1e-12)

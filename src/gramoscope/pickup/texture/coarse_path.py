@@ -94,7 +94,7 @@ def silenced(support: FloatArray, lost: BoolArray, wall: IntArray, *, least_best
     least_best_support : float
         Where no stripe at all has that much none is believed.
     """
-    left = np.zeros_like(support)
+    left = np.zeros(support.shape)
     _let_speak(support, lost, wall, least_best_support, left)
     return left
 

@@ -184,7 +184,7 @@ def step(found: Evidence, cut: Cut, rules: Rules) -> FloatArray:
     What both walls say together moves the groove in the direction of its cut, what they say against each other in the
     other one, slowly. Where one wall is silent it goes along with the other.
     """
-    moved = np.zeros_like(found.score)
+    moved = np.empty(found.score.shape)
     limits = (rules.smooth_px, rules.step_noise_px, rules.largest_step_px)
     if cut == "stereo":
         smooth_px = smoothing_px(found.information, limits)
@@ -247,7 +247,7 @@ def read(stretch: Stretch, models: Sequence[Model], cut: Cut, rules: Rules) -> t
     """Return the stretch with its path improved by one round with each model, and the evidence about that path."""
     begun = seen = replace(stretch, displacement_px=stretch.displacement_px.copy())
     path = seen.displacement_px
-    move = np.zeros_like(path)
+    move = np.zeros(path.shape)
     for model in models:
         if seen.tone != model.tone:
             seen = begun.in_tone(model.tone)
