@@ -4,9 +4,15 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from gramoscope.pickup.texture.smoothing import blur, half_bell, half_widths, smoothed
+from gramoscope.pickup.texture.smoothing import blur, half_bell, half_widths, smooth
 
 VALUES = np.cumsum(np.random.default_rng(2).normal(size=800)) + 3
+
+
+def smoothed(values: np.ndarray, sigma: float) -> np.ndarray:
+    out = np.empty_like(values)
+    smooth(values, sigma, out)
+    return out
 
 
 @pytest.mark.parametrize("sigma", [2.6, 12.0, 17.3, 24.0, 200.0])

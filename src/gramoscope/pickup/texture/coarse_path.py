@@ -28,6 +28,7 @@ def sign_of(cut: Cut) -> FloatArray:
 
 
 LATERAL, VERTICAL = np.array([1.0, 1.0]), np.array([-1.0, 1.0])
+"""Signs of the inner and the outer wall."""
 
 
 def along_columns(cells: FloatArray, columns: slice, *, cell_px: int, half_bell: FloatArray) -> FloatArray:
@@ -77,6 +78,7 @@ def of_walls(support: FloatArray, wall: IntArray) -> FloatArray:
 
 @numba.njit(cache=True, nogil=True)
 def _raise_walls(support, wall, best):  # type: ignore[no-untyped-def]
+    """Raise the support of walls to that of each of their stripes."""
     for i in range(wall.size):
         for x in range(support.shape[1]):
             best[wall[i], x] = max(best[wall[i], x], support[i, x])

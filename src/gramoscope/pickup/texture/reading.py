@@ -151,6 +151,7 @@ class Rules:
 
 
 UNJUDGED: FloatArray = np.full(2, np.nan)
+"""The surprise of walls that nobody asks about, or nobody heard."""
 
 
 def evidence(stretch: Stretch, model: Model, rules: Rules, *, judged: bool = True) -> Evidence:

@@ -39,27 +39,15 @@ def _running_mean(values, half, out):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def smooth(values, sigma, out):  # type: ignore[no-untyped-def]
-    """Write one row smoothed; see `smoothed`."""
+    """Write one row, smoothed by about a Gaussian of so many columns; beyond the ends each running mean holds the last value.
+
+    A NaN spreads to all that follows it.
+    """
     first, second, third = half_widths(sigma)
     between = np.empty_like(values)
     _running_mean(values, first, out)
     _running_mean(out, second, between)
     _running_mean(between, third, out)
-
-
-def smoothed(values: FloatArray, sigma: float) -> FloatArray:
-    """Return a row smoothed by about a Gaussian; beyond the ends each running mean holds the last value.
-
-    Parameters
-    ----------
-    values : float64 array, shape (column,)
-        A NaN spreads to all that follows it.
-    sigma : float
-        Standard deviation, columns.
-    """
-    out = np.empty_like(values)
-    smooth(values, sigma, out)
-    return out
 
 
 def half_bell(sigma: float) -> FloatArray:
