@@ -17,13 +17,20 @@ import numpy.typing as npt
 from gramoscope.camera.film_line import film_line
 from gramoscope.conventions import BoolArray, Float32Array, FloatArray, IntArray
 from gramoscope.pickup.device import Kept
+from gramoscope.pickup.film_lanes import PIXELS, sum_lines, sum_phases, write_as_columns
 from gramoscope.pickup.registration import cubic_taps, placement
 from gramoscope.signal_path import ImageArray
 
 TILE_ROWS, TILE_COLUMNS = 16, 64
 """So much of the picture is wanted or not. Sixteen rows are averaged before they are written: a cache line of each column."""
-RUN_TILES = 8
+RUN_TILES = 32
 """So many tiles at most are averaged at a time: what they add up to stays near."""
+ROOM = 48
+"""Sums are written, and read, beyond the end of a line by no more than this."""
+SOON_ROWS = 2
+"""Rows of film are called for so many rows ahead."""
+MOST_AT_ONCE = 256
+"""So many frames are added up as whole numbers of twice as many bits as theirs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,83 +71,105 @@ def _add_frame(film, first, stride, taps, start, stop, total):  # type: ignore[n
 
 
 @numba.njit(cache=True, nogil=True)
-def _write(total, share, first, columns):  # type: ignore[no-untyped-def]
-    """Write rows of sums as columns of means."""
-    rows = total.shape[0]
-    for x in range(columns.shape[0]):
-        column = columns[x, first : first + rows]
-        for j in range(rows):
-            column[j] = total[j, x] * share[x]
+def _phases(places, fraction):  # type: ignore[no-untyped-def]
+    """Return where frames of one fraction of a pixel begin, and their taps; as many at a time as sums have room for."""
+    first, taps, count = np.empty(len(places) + 1, np.int64), np.empty((len(places), 4), np.float32), 0
+    for k in range(len(places)):
+        if count == 0 or fraction[k] != fraction[first[count - 1]] or k - first[count - 1] == MOST_AT_ONCE:
+            first[count], taps[count] = k, cubic_taps(fraction[k])
+            count += 1
+    first[count] = len(places)
+    return first[: count + 1], taps[:count].copy().reshape(4 * count)
 
 
 @numba.njit(cache=True, nogil=True)
-def _add_integers(film, first, into):  # type: ignore[no-untyped-def]
-    """Add pixels of a film as one line to a line of sums."""
-    here = np.uint64(first)
-    for x in range(np.uint64(into.size)):
-        into[x] += film[here + x]
-
-
-@numba.njit(cache=True, nogil=True, fastmath={"contract"})
-def _interpolate(sums, taps, total):  # type: ignore[no-untyped-def]
-    """Add sums of pixels, at one fraction of a pixel; they begin a column before the total."""
-    w0, w1, w2, w3 = np.float32(taps[0]), np.float32(taps[1]), np.float32(taps[2]), np.float32(taps[3])
-    one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
-    for x in range(np.uint64(total.size)):
-        near = w0 * np.float32(sums[x]) + w1 * np.float32(sums[x + one])
-        total[x] += near + w2 * np.float32(sums[x + two]) + w3 * np.float32(sums[x + three])
+def _common(places, run):  # type: ignore[no-untyped-def]
+    """Return the columns of a run to which all frames reach; none, at its end, if they are few."""
+    start, stop = run
+    for k in range(len(places)):
+        start, stop = max(start, places[k, 1]), min(stop, places[k, 2])
+    return (start, stop) if stop - start >= PIXELS else (run[1], run[1])
 
 
 @numba.njit(cache=True, nogil=True)
-def _add_frames(film, shape, places, taps, rows, run, sums, total):  # type: ignore[no-untyped-def]
-    """Add frames that lie at one fraction of a pixel to some rows of a run of columns.
-
-    Where all of them reach they are added up as whole numbers, whose sum is interpolated; the ends of each by itself.
-    """
-    step, width = shape
-    common_start, common_stop = run
-    for _, start, stop, _ in places:
-        common_start, common_stop = max(common_start, start), min(common_stop, stop)
-    if common_stop <= common_start:
-        common_start = common_stop = run[1]
-    line = sums[: common_stop - common_start + 3]
-    for j in range(rows[1] - rows[0]):
-        if common_stop > common_start:
-            line[:] = 0
-            for k, _, _, offset in places:
-                _add_integers(film, k * step + (rows[0] + j) * width + common_start + offset - 1, line)
-            _interpolate(line, taps, total[j, common_start - run[0] : common_stop - run[0]])
-    for k, start, stop, offset in places:
-        pixel = k * step + rows[0] * width + offset - 1
+def _add_ends(film, shape, places, fraction, rows, run, common, total):  # type: ignore[no-untyped-def]
+    """Write what frames add up to where not all of them reach, each interpolated by itself."""
+    total[:, : common[0] - run[0]] = np.float32(0)
+    total[:, common[1] - run[0] : run[1] - run[0]] = np.float32(0)
+    for i in range(len(places)):
+        k, start, stop, offset = places[i]
+        pixel = k * shape[0] + rows[0] * shape[1] + offset - 1
         for first, last in (
-            (max(start, run[0]), min(stop, common_start)),
-            (max(start, common_stop), min(stop, run[1])),
+            (max(start, run[0]), min(stop, common[0])),
+            (max(start, common[1]), min(stop, run[1])),
         ):
             if last > first:
-                _add_frame(film, pixel + first, width, taps, first - run[0], last - run[0], total)
+                taps = cubic_taps(fraction[i])
+                _add_frame(film, pixel + first, shape[1], taps, first - run[0], last - run[0], total)
 
 
 @numba.njit(cache=True, nogil=True)
-def _overlay_run(film, shape, places, fraction, share, rows, run, sums, total, columns):  # type: ignore[no-untyped-def]
-    """Average some rows of a run of columns."""
-    part = total[: rows[1] - rows[0]]
-    part[:] = np.float32(0)
-    first = 0
-    while first < len(places):
-        last = first
-        while last < len(places) and fraction[last] == fraction[first]:
-            last += 1
-        _add_frames(film, shape, places[first:last], cubic_taps(fraction[first]), rows, run, sums, part)
-        first = last
-    _write(part, share[run[0] : run[1]], rows[0], columns[run[0] : run[1]])
+def _add_up(film, width, begins, phases, taps, rows, run, common, lines, total):  # type: ignore[no-untyped-def]
+    """Write what frames add up to where all of them reach."""
+    line, sums = total.shape[1], total.reshape(total.size)
+    step, count = lines.size // (len(phases) - 1), common[1] - common[0]
+    for j in range(rows[1] - rows[0]):
+        first = (rows[0] + j) * width + common[0]
+        for p in range(len(phases) - 1):
+            frames = phases[p + 1] - phases[p]
+            sum_lines(film, begins, phases[p], frames, first, SOON_ROWS * width, lines, p * step, count + 3)
+        sum_phases(lines, step, taps, len(phases) - 1, sums, j * line + common[0] - run[0], count)
 
 
 @numba.njit(cache=True, nogil=True)
-def _overlay(film, shape, places, fraction, share, wanted, sums, columns):  # type: ignore[no-untyped-def]
-    """Draw the wanted tiles of frames that lie so far apart in a line of film, in rows of such a width."""
+def _write(total, share, run, rows, columns):  # type: ignore[no-untyped-def]
+    """Write rows of sums as columns of means."""
+    height, line = columns.shape[1], columns.reshape(columns.size)
+    count, sums = run[1] - run[0], total.reshape(total.size)
+    if rows[1] - rows[0] == TILE_ROWS and count >= TILE_ROWS:
+        write_as_columns(sums, 0, total.shape[1], share, run[0], count, line, run[0] * height + rows[0], height)
+        return
+    for x in range(count):
+        for j in range(rows[1] - rows[0]):
+            columns[run[0] + x, rows[0] + j] = total[j, x] * share[run[0] + x]
+
+
+@numba.njit(cache=True, nogil=True)
+def _clear(line, first, count):  # type: ignore[no-untyped-def]
+    """Write black to so many places of a line."""
+    here = np.uint64(first)
+    for j in range(np.uint64(count)):
+        line[here + j] = np.float32(0)
+
+
+@numba.njit(cache=True, nogil=True)
+def _blacken(wanted, columns):  # type: ignore[no-untyped-def]
+    """Write black to all tiles that are not wanted, as many at a time as lie below each other."""
+    (width, height), flat = columns.shape, columns.reshape(columns.size)
+    for tile in range(wanted.shape[1]):
+        block = 0
+        while block < len(wanted):
+            first = block
+            while block < len(wanted) and not wanted[block, tile]:
+                block += 1
+            low, high = first * TILE_ROWS, min(block * TILE_ROWS, height)
+            if high > low:
+                for x in range(tile * TILE_COLUMNS, min((tile + 1) * TILE_COLUMNS, width)):
+                    _clear(flat, x * height + low, high - low)
+            else:
+                block += 1
+
+
+@numba.njit(cache=True, nogil=True)
+def _overlay(film, shape, places, fraction, share, wanted, columns):  # type: ignore[no-untyped-def]
+    """Draw the wanted tiles of frames that lie so far apart in a line of film, in rows of such a width; others are black."""
     tiles = wanted.shape[1]
-    total = np.empty((TILE_ROWS, RUN_TILES * TILE_COLUMNS), np.float32)
-    for block in range(wanted.shape[0]):
+    phases, taps = _phases(places, fraction)
+    begins = places[:, 0] * shape[0] + places[:, 3] - 1
+    longest = RUN_TILES * TILE_COLUMNS
+    total = np.empty((TILE_ROWS, longest + ROOM), np.float32)
+    lines = np.empty((len(phases) - 1) * (longest + ROOM), np.float32)
+    for block in range(len(wanted)):
         rows = (block * TILE_ROWS, min((block + 1) * TILE_ROWS, columns.shape[1]))
         tile = 0
         while tile < tiles:
@@ -149,9 +178,14 @@ def _overlay(film, shape, places, fraction, share, wanted, sums, columns):  # ty
                 tile += 1
             if tile > first:
                 run = (first * TILE_COLUMNS, min(tile * TILE_COLUMNS, columns.shape[0]))
-                _overlay_run(film, shape, places, fraction, share, rows, run, sums, total, columns)
+                common = _common(places, run)
+                if common[1] > common[0]:
+                    _add_up(film, shape[1], begins, phases, taps, rows, run, common, lines, total)
+                _add_ends(film, shape, places, fraction, rows, run, common, total[: rows[1] - rows[0]])
+                _write(total, share, run, rows, columns)
             else:
                 tile += 1
+    _blacken(wanted, columns)
 
 
 def all_tiles(shape: tuple[int, int]) -> BoolArray:
@@ -220,18 +254,28 @@ def overlay(
     height, width = images.shape[1:]
     canvas_width = overlay_width(width, shift_px)
     counts = frames_in(width, shift_px)
-    columns = np.zeros((canvas_width, height), np.float32)
+    columns = _picture(canvas_width, height)
     tiles = all_tiles((height, canvas_width)) if wanted is None else wanted
     share = (1 / np.maximum(counts, 1)).astype(np.float32)
     film, step = film_line(images)
     places, fraction = _by_fraction(shift_px, width, canvas_width)
-    sums = np.empty(RUN_TILES * TILE_COLUMNS + 3, sum_type(images))
-    _overlay(film, (step, width), places, fraction, share, tiles, sums, columns)
+    _overlay(film, (step, width), places, fraction, share, tiles, columns)
     covered = np.flatnonzero(counts)
     if covered.size:
         columns[: covered[0]] = columns[covered[0]]
         columns[covered[-1] + 1 :] = columns[covered[-1]]
     return Overlay(columns, counts, shift_px, frame_index)
+
+
+def _picture(width: int, height: int) -> Float32Array:
+    """Return room for a picture, [column, row], that begins at a cache line."""
+    room = np.empty(width * height + LINE, np.float32)
+    begin = -room.ctypes.data // room.itemsize % LINE
+    return room[begin : begin + width * height].reshape(width, height)
+
+
+LINE = 16
+"""Numbers of single precision in a cache line."""
 
 
 def _by_fraction(shift_px: FloatArray, width: int, canvas_width: int) -> tuple[IntArray, FloatArray]:

@@ -1,0 +1,156 @@
+"""Lines of film added, interpolated and turned into columns, many pixels of them as one vector of the processor.
+
+Pixels are small whole numbers: 64 of them are added at a time, and what frames that lie at one fraction of a pixel add up to
+becomes single precision on its way out of the registers. A picture is drawn row by row and wanted column by column: sixteen
+rows of sixteen columns change places without touching memory, and leave as whole cache lines. As in `texture.vector_lanes`,
+arrays are C-contiguous and given with the place in them where to begin.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+
+from gramoscope.pickup.texture.vector_lanes import LANES, Value, _compiled, _function, _room, _Writer
+
+PIXELS = 64
+"""So many pixels are added at a time; a line has at least as many."""
+_LONG, _INT = ir.IntType(64), ir.IntType(32)
+_ANY = ir.Constant(ir.VectorType(ir.FloatType(), LANES), ir.Undefined)
+
+
+def _places(numbers: list[int]) -> Value:
+    return ir.Constant(ir.VectorType(_INT, len(numbers)), numbers)
+
+
+def _least(w: _Writer, one: Value, other: Value) -> Value:
+    return w.builder.select(w.builder.icmp_signed("<", one, other), one, other)
+
+
+def _in_pieces(w: _Writer, count: Value, size: int) -> tuple[Value, Any]:
+    """How many pieces of such a size make up a line, and where each begins: the last one ends where the line does."""
+    pieces = w.builder.sdiv(w.plus(count, size - 1), ir.Constant(_LONG, size))
+    last = w.plus(count, -size)
+    return pieces, lambda piece: _least(w, w.times(piece, size), last)
+
+
+def _pixels(w: _Writer, film: Value, place: Value, kind: ir.IntType) -> Value:
+    """Pixels from a place on, as whole numbers of such a kind."""
+    seen = ir.VectorType(film.type.pointee, PIXELS)
+    near = w.builder.bitcast(w.builder.gep(film, [place]), seen.as_pointer())
+    return w.builder.zext(w.builder.load(near, align=1), ir.VectorType(kind, PIXELS))
+
+
+def _write_real(w: _Writer, numbers: Value, line: Value, place: Value) -> None:
+    """Write whole numbers as numbers of single precision."""
+    real = w.builder.uitofp(numbers, ir.VectorType(ir.FloatType(), PIXELS))
+    w.builder.store(real, w.builder.bitcast(w.builder.gep(line, [place]), real.type.as_pointer()), align=4)
+
+
+def _sum_of_lines(w: _Writer) -> None:
+    film, begins, first, frames, offset, soon, line, place, count = w.arguments
+    kind = ir.IntType(2 * film.type.pointee.width)
+    pieces, begin = _in_pieces(w, count, PIXELS)
+    room = _room(w.builder, ir.VectorType(kind, PIXELS))
+
+    def piece(number: Value) -> None:
+        x = begin(number)
+        w.builder.store(ir.Constant(room.type.pointee, [0] * PIXELS), room)
+
+        def frame(k: Value) -> None:
+            there = w.builder.load(w.builder.gep(begins, [w.plus(first, k)]))
+            here = w.plus(w.plus(there, offset), x)
+            w.call_for(film, w.plus(here, soon))
+            seen = _pixels(w, film, here, kind)
+            w.builder.store(w.builder.add(w.builder.load(room), seen), room)
+
+        w.loop(frames, frame)
+        _write_real(w, w.builder.load(room), line, w.plus(place, x))
+
+    w.loop(pieces, piece)
+
+
+def _moved(w: _Writer, here: Value, behind: Value, far: int) -> Value:
+    """What begins so many numbers after the first of two neighbouring vectors."""
+    return w.builder.shuffle_vector(here, behind, _places([far + k for k in range(LANES)])) if far else here
+
+
+def _sum_of_phases(w: _Writer) -> None:
+    lines, step, taps, phases, total, place, count = w.arguments
+    at_once = 2
+    first = w.sums(at_once)
+
+    def piece(number: Value) -> None:
+        x = w.times(number, at_once * LANES)
+        for room in first:
+            w.builder.store(w.constant(0.0), room)
+
+        def phase(p: Value) -> None:
+            weight = [w.spread(taps, w.plus(w.times(p, 4), t)) for t in range(4)]
+            here = w.plus(w.times(p, step), x)
+            seen = [w.load(lines, w.plus(here, k * LANES)) for k in range(at_once + 1)]
+            for k, room in enumerate(first):
+                value = w.builder.fmul(weight[1], _moved(w, seen[k], seen[k + 1], 1))
+                for t in (0, 2, 3):
+                    value = w.times_and(weight[t], _moved(w, seen[k], seen[k + 1], t), value)
+                w.builder.store(w.builder.fadd(w.builder.load(room), value), room)
+
+        w.loop(phases, phase)
+        for k, room in enumerate(first):
+            w.store(w.builder.load(room), total, w.plus(w.plus(place, x), k * LANES))
+
+    w.loop(w.builder.sdiv(w.plus(count, at_once * LANES - 1), ir.Constant(_LONG, at_once * LANES)), piece)
+
+
+def _turned(w: _Writer, rows: list[Value]) -> list[Value]:
+    """Sixteen rows of sixteen columns as columns (J. O. Eklundh, 1972)."""
+    far = LANES // 2
+    while far:
+        order = [k if not k & far else LANES + k - far for k in range(LANES)]
+        for j in range(LANES):
+            if not j & far:
+                one, other = rows[j], rows[j + far]
+                rows[j] = w.builder.shuffle_vector(one, other, _places(order))
+                rows[j + far] = w.builder.shuffle_vector(one, other, _places([k + far for k in order]))
+        far //= 2
+    return rows
+
+
+def _means_as_columns(w: _Writer) -> None:
+    total, begin, step, share, first, count, columns, place, height = w.arguments
+    pieces, start = _in_pieces(w, count, LANES)
+
+    def piece(number: Value) -> None:
+        x = start(number)
+        part = w.load(share, w.plus(first, x))
+        rows = [w.load(total, w.plus(w.plus(begin, x), w.times(step, j))) for j in range(LANES)]
+        into = w.plus(place, w.times(x, height))
+        for k, column in enumerate(_turned(w, [w.builder.fmul(row, part) for row in rows])):
+            w.store(column, columns, w.plus(into, w.times(height, k)))
+
+    w.loop(pieces, piece)
+
+
+@_compiled
+def sum_lines(_, film, begins, first, frames, offset, soon, line, place, count):  # type: ignore[no-untyped-def]
+    """Write sums of so many lines of a film, which begin `offset` after the places given, as single precision.
+
+    At least `PIXELS` of them; those `soon` places further on are called for.
+    """
+    return _function((film, begins, first, frames, offset, soon, line, place, count), _sum_of_lines)
+
+
+@_compiled
+def sum_phases(_, lines, step, taps, phases, total, place, count):  # type: ignore[no-untyped-def]
+    """Write sums of lines, `step` apart, each interpolated by four taps of its own.
+
+    Up to 31 numbers more than are asked for are written, and 16 more of each line are read.
+    """
+    return _function((lines, step, taps, phases, total, place, count), _sum_of_phases)
+
+
+@_compiled
+def write_as_columns(_, total, begin, step, share, first, count, columns, place, height):  # type: ignore[no-untyped-def]
+    """Write sixteen rows, `step` apart, as at least sixteen columns, `height` apart, each times its share."""
+    return _function((total, begin, step, share, first, count, columns, place, height), _means_as_columns)
