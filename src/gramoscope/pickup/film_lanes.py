@@ -154,3 +154,62 @@ def sum_phases(_, lines, step, taps, phases, total, place, count):  # type: igno
 def write_as_columns(_, total, begin, step, share, first, count, columns, place, height):  # type: ignore[no-untyped-def]
     """Write sixteen rows, `step` apart, as at least sixteen columns, `height` apart, each times its share."""
     return _function((total, begin, step, share, first, count, columns, place, height), _means_as_columns)
+
+
+def _summed(w: _Writer, rows: list[Value]) -> list[Value]:
+    """Sums of the first and of the last eight numbers of sixteen vectors, as two vectors.
+
+    Two vectors become one, three times over: the fourth number further on is added, then neighbours, then theirs.
+    """
+    half = LANES // 2
+    owner = [[(row, column // half) for column in range(LANES)] for row in range(LANES)]
+    fours = [k for k in range(2 * LANES) if k % half < 4]
+    fours = [k for first in (0, half) for k in (*fours[first // 2 : first // 2 + 4], *fours[half + first // 2 :][:4])]
+    for kept, far in ((fours, 4), (range(0, 2 * LANES, 2), 1), (range(0, 2 * LANES, 2), 1)):
+        one, other = list(kept), [k + far for k in kept]
+        rows, owner = (
+            [
+                w.builder.fadd(*(w.builder.shuffle_vector(a, b, _places(order)) for order in (one, other)))
+                for a, b in zip(rows[0::2], rows[1::2], strict=True)
+            ],
+            [[(a + b)[k] for k in one] for a, b in zip(owner[0::2], owner[1::2], strict=True)],
+        )
+    both = owner[0] + owner[1]
+    return [
+        w.builder.shuffle_vector(rows[0], rows[1], _places([both.index((row, part)) for row in range(LANES)]))
+        for part in (0, 1)
+    ]
+
+
+def _energies_of_cells(w: _Writer) -> None:
+    lines, begin, step, weight, cells, energy, place, height = w.arguments
+    pieces, start = _in_pieces(w, cells, 2)
+    half = w.constant(0.5)
+
+    def piece(number: Value) -> None:
+        cell = start(number)
+        x = w.times(cell, LANES // 2)
+        share = w.load(weight, x)
+        squares = []
+        for j in range(LANES):
+            first = w.plus(w.plus(w.plus(begin, x), w.times(step, j)), -2)
+            here, behind = w.load(lines, first), w.load(lines, w.plus(first, LANES))
+            far_before, before, after, far_after = (_moved(w, here, behind, far) for far in (0, 1, 3, 4))
+            near, beyond = w.builder.fsub(after, before), w.builder.fsub(far_after, far_before)
+            difference = w.builder.fmul(w.times_and(half, beyond, near), share)
+            squares.append(w.builder.fmul(difference, difference))
+        into = w.plus(place, w.times(cell, height))
+        for k, energies in enumerate(_summed(w, squares)):
+            w.store(energies, energy, w.plus(into, w.times(height, k)))
+
+    w.loop(pieces, piece)
+
+
+@_compiled
+def write_energies(_, lines, begin, step, weight, cells, energy, place, height):  # type: ignore[no-untyped-def]
+    """Write the energies of at least two cells of eight columns, `height` apart, for sixteen rows, `step` apart.
+
+    Energies are the squares of slopes by the derivative of a Gaussian of about one pixel, from four columns: what is two
+    before and two behind a row is read, too. Each slope is given its column's weight.
+    """
+    return _function((lines, begin, step, weight, cells, energy, place, height), _energies_of_cells)

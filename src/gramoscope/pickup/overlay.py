@@ -295,15 +295,6 @@ def placements(shift_px, width, canvas_width):  # type: ignore[no-untyped-def]
     return places, fraction
 
 
-def sum_type(images: ImageArray) -> type[np.uint16] | type[np.uint32]:
-    """Return the narrowest whole numbers that hold the sum of all frames."""
-    return np.uint16 if images.dtype == np.uint8 and len(images) <= FRAMES_IN_16_BITS else np.uint32
-
-
-FRAMES_IN_16_BITS = (2**16 - 1) // (2**8 - 1)
-"""The sum of so many frames of eight bits has no more than sixteen."""
-
-
 PHASES = 4
 """Frames lie over each other to a quarter of a pixel: at most so many sums of frames are interpolated, in place of all frames.
 At a third of a cycle a pixel that costs 1.1 % of the texture's amplitude."""

@@ -243,23 +243,33 @@ def test_a_picture_without_texture_is_nowhere_sharp() -> None:
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
-def test_the_energy_of_a_cell_is_that_of_the_frames_laid_over_each_other(dtype: type) -> None:
+@pytest.mark.parametrize("height", [4, 21])
+@pytest.mark.parametrize(
+    ("width", "begin"), [(70, [0, 3, 7]), (70, [0, 3, 60]), (9, [0, 1, 2]), (300, [0, 8, 8, 31]), (300, [5, 0])]
+)
+def test_the_energy_of_a_cell_is_that_of_the_frames_laid_over_each_other(
+    dtype: type, height: int, width: int, begin: list[int]
+) -> None:
     rng = np.random.default_rng(7)
-    images, shift = rng.integers(0, 250, (3, 4, 70)).astype(dtype), np.array([0.0, 3.4, 7.7])
-    total, count = np.zeros((4, 77)), np.zeros(77)
-    for image, first in zip(images, (0, 3, 7), strict=True):
-        total[:, first : first + 70] += image
-        count[first : first + 70] += 1
+    images = rng.integers(0, 250, (len(begin), height, width)).astype(dtype)
+    whole = width + max(begin)
+    cells = whole // CELL_PX
+    total, count = np.zeros((height, whole)), np.zeros(whole)
+    for image, first in zip(images, begin, strict=True):
+        total[:, first : first + width] += image
+        count[first : first + width] += 1
     mean = total / count
     slope = mean[:, 4:-2] - mean[:, 2:-4] + 0.5 * (mean[:, 5:-1] - mean[:, 1:-5])
     square = np.pad(slope**2, ((0, 0), (3, 3)))
-    expected = square[:, :72].reshape(4, 9, CELL_PX).sum(axis=2).T
-    energy = np.empty((9, 4), np.float32)
-    total_room = np.empty(77, np.uint16 if dtype is np.uint8 else np.uint32)
-    share = (1 / count).astype(np.float32)
-    cell_energy(*film_line(images), 70, np.arange(3), np.array([0, 3, 7]), share, total_room, energy)
+    expected = square[:, : cells * CELL_PX].reshape(height, cells, CELL_PX).sum(axis=2).T
+    energy = np.empty((cells, height), np.float32)
+    cell_energy(*film_line(images), width, np.arange(len(begin)), np.array(begin), whole, energy)
     np.testing.assert_allclose(energy, expected, rtol=1e-4)
-    # uneven shifts count to whole pixels, and the last frame ends where the picture does
+
+
+def test_uneven_shifts_count_to_whole_pixels() -> None:
+    images, shift = np.random.default_rng(7).integers(0, 250, (3, 4, 70)).astype(np.uint8), np.array([0.0, 3.4, 7.7])
+    # the last frame ends where the picture does
     assert sharpness(images, shift).relative.shape == (9, 4)
 
 

@@ -15,14 +15,18 @@ import numpy as np
 
 from gramoscope.camera.film_line import film_line
 from gramoscope.conventions import Float32Array, FloatArray, IntArray
-from gramoscope.pickup.overlay import overlay_width, sum_type
+from gramoscope.pickup.film_lanes import PIXELS, sum_lines, write_energies
+from gramoscope.pickup.overlay import overlay_width
+from gramoscope.pickup.texture.vector_lanes import LANES
 from gramoscope.quantile import quantile
 from gramoscope.signal_path import ImageArray
 
 CELL_PX = 8
-"""Columns in a cell; `_sums_of_eight` adds so many."""
+"""Columns in a cell; `film_lanes.write_energies` adds so many."""
 ROWS = 16
 """So many rows are looked at before their energies are written."""
+SOON_ROWS = 2
+"""Rows of film are called for so many rows ahead."""
 CEILING = 1.5
 SOME_FRAMES = 4
 """So many frames at most, the first and the last among them, show where the picture is sharp: most of what is uncertain is the
@@ -30,61 +34,79 @@ texture, the same in all."""
 
 
 @numba.njit(cache=True, nogil=True)
-def _add_pixels(film, first, total, begin, count):  # type: ignore[no-untyped-def]
-    """Add pixels of a film as one line; unsigned places, for signed ones may count from the end."""
-    here, there = np.uint64(first), np.uint64(begin)
-    for x in range(np.uint64(count)):
-        total[there + x] += film[here + x]
+def _pieces(offset, width, canvas_width):  # type: ignore[no-untyped-def]
+    """Return where the same frames lie over each other: first frame, last but one, first column, last but one.
 
-
-@numba.njit(cache=True, nogil=True)
-def _squares(far_before, before, after, far_after, square):  # type: ignore[no-untyped-def]
-    """The derivative of a Gaussian of about one pixel, from four columns, squared."""
-    half = np.float32(0.5)
-    for x in range(square.size):
-        difference = after[x] - before[x] + half * (far_after[x] - far_before[x])
-        square[x] = difference * difference
-
-
-@numba.njit(cache=True, nogil=True)
-def _scale(total, share, mean):  # type: ignore[no-untyped-def]
-    for x in range(mean.size):
-        mean[x] = total[x] * share[x]
-
-
-@numba.njit(cache=True, nogil=True)
-def _sums_of_eight(v, sums):  # type: ignore[no-untyped-def]
-    one, two, three, four = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(4)
-    for cell in range(np.uint64(sums.size)):
-        a = cell * np.uint64(CELL_PX)
-        b = a + four
-        sums[cell] = ((v[a] + v[b]) + (v[a + one] + v[b + one])) + (
-            (v[a + two] + v[b + two]) + (v[a + three] + v[b + three])
-        )
-
-
-@numba.njit(cache=True, nogil=True)
-def cell_energy(film, step, width, frames, offset, share, total, energy):  # type: ignore[no-untyped-def]
-    """Write the energy of each cell of the mean of some frames of a line of film, laid over each other by whole pixels.
-
-    They are added up in `total`.
+    Pieces where fewer frames lie come first, and reach into those where more do, so that they can be added in vectors.
     """
-    height = energy.shape[1]
-    mean, square = np.empty(total.size, np.float32), np.zeros(total.size, np.float32)
-    # a column of cells is written a cache line at a time
-    part = np.empty((ROWS, len(energy)), np.float32)
+    edges = np.unique(np.concatenate((offset, offset + width)))
+    pieces = np.empty((edges.size - 1, 4), np.int64)
+    for i in range(edges.size - 1):
+        low, high = edges[i], min(edges[i + 1], canvas_width)
+        first = np.searchsorted(offset + width, low, side="right")
+        stop = np.searchsorted(offset, low, side="right")
+        if stop > first and high - low < PIXELS:
+            if stop < offset.size and first == 0 and low + PIXELS <= offset[0] + width:
+                high = low + PIXELS
+            elif first > 0 and stop == offset.size and high - PIXELS >= offset[-1]:
+                low = high - PIXELS
+        pieces[i] = first, stop, low, high
+    return pieces[np.argsort(pieces[:, 1] - pieces[:, 0], kind="mergesort")]
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_few(film, begins, first, stop, line, place, count):  # type: ignore[no-untyped-def]
+    """Write sums of some lines of a film, each of few pixels."""
+    for x in range(count):
+        total = 0.0
+        for k in range(first, stop):
+            total += film[begins[k] + x]
+        line[place + x] = total
+
+
+@numba.njit(cache=True, nogil=True)
+def _scale(line, place, count, gain):  # type: ignore[no-untyped-def]
+    here = np.uint64(place)
+    for x in range(np.uint64(count)):
+        line[here + x] *= gain
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_row(film, begins, offset, row, width, pieces, line, place):  # type: ignore[no-untyped-def]
+    """Write what a row of all frames adds up to; where some of them are missing, what it would have been with them."""
+    for first, stop, low, high in pieces:
+        if high - low >= PIXELS:
+            there = row * width + low
+            sum_lines(film, begins, first, stop - first, there, SOON_ROWS * width, line, place + low, high - low)
+        else:
+            _add_few(film, begins + row * width + low, first, stop, line, place + low, high - low)
+        if stop - first < offset.size:
+            _scale(line, place + low, high - low, np.float32(offset.size / max(stop - first, 1)))
+
+
+@numba.njit(cache=True, nogil=True)
+def cell_energy(film, step, width, frames, offset, canvas_width, energy):  # type: ignore[no-untyped-def]
+    """Write the energy of each cell of the mean of some frames of a line of film, laid over each other by whole pixels."""
+    cells, height = energy.shape
+    order = np.argsort(offset)
+    frames, offset = frames[order], offset[order]
+    pieces, begins = _pieces(offset, width, canvas_width), frames * step - offset
+    weight = np.zeros(max(canvas_width, 2 * CELL_PX), np.float32)
+    # beyond, the derivative would need columns that are not there
+    weight[3 : canvas_width - 3] = np.float32(1 / frames.size)
+    line = weight.size + 2 * LANES
+    lines = np.zeros(ROWS * line, np.float32)
+    part = np.empty((max(cells, 2), ROWS), np.float32)
+    flat, some = energy.reshape(energy.size), part.reshape(part.size)
     for first in range(0, height, ROWS):
-        stop = min(first + ROWS, height)
-        for row in range(first, stop):
-            total[:] = 0
-            for k in range(frames.size):
-                _add_pixels(film, frames[k] * step + row * width, total, offset[k], width)
-            _scale(total, share, mean)
-            _squares(mean[1:-5], mean[2:-4], mean[4:-2], mean[5:-1], square[3:-3])
-            _sums_of_eight(square, part[row - first])
-        for cell in range(len(energy)):
-            for j in range(stop - first):
-                energy[cell, first + j] = part[j, cell]
+        rows = min(ROWS, height - first)
+        for j in range(rows):
+            _add_row(film, begins, offset, first + j, width, pieces, lines, j * line + LANES)
+        if rows == ROWS and cells >= 2:
+            write_energies(lines, LANES, line, weight, cells, flat, first, height)
+        else:
+            write_energies(lines, LANES, line, weight, len(part), some, 0, ROWS)
+            energy[:, first : first + rows] = part[:cells, :rows]
 
 
 FAINTEST = 0.25
@@ -128,10 +150,8 @@ def sharpness(images: ImageArray, shift_px: FloatArray, *, ceiling: float = CEIL
     Sharpness
     """
     frames, offset, share = whole_pixels(images.shape[2], shift_px)
-    width = share.size
-    energy = np.empty((width // CELL_PX, images.shape[1]), np.float32)
-    total = np.empty(width, sum_type(images))
-    cell_energy(*film_line(images), images.shape[2], frames, offset, share, total, energy)
+    energy = np.empty((share.size // CELL_PX, images.shape[1]), np.float32)
+    cell_energy(*film_line(images), images.shape[2], frames, offset, share.size, energy)
     return sharpness_of(energy, ceiling=ceiling)
 
 
