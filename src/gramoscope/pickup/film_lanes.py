@@ -16,6 +16,9 @@ from gramoscope.pickup.texture.vector_lanes import LANES, Value, _compiled, _fun
 
 PIXELS = 64
 """So many pixels are added at a time; a line has at least as many."""
+COLUMNS = 32
+"""Of so many, products are added at a time; a row has at least as many."""
+PRODUCTS = 8
 _LONG, _INT = ir.IntType(64), ir.IntType(32)
 _ANY = ir.Constant(ir.VectorType(ir.FloatType(), LANES), ir.Undefined)
 
@@ -213,3 +216,48 @@ def write_energies(_, lines, begin, step, weight, cells, energy, place, height):
     before and two behind a row is read, too. Each slope is given its column's weight.
     """
     return _function((lines, begin, step, weight, cells, energy, place, height), _energies_of_cells)
+
+
+def _products_of_rows(w: _Writer) -> None:
+    film, here, there, count, sums = w.arguments
+    b, bits = w.builder, film.type.pointee.width
+    small, wide = (ir.VectorType(ir.IntType(size * bits), COLUMNS) for size in (2, 4))
+    pieces, start = _in_pieces(w, count, COLUMNS)
+    rooms = [_room(b, wide) for _ in range(PRODUCTS)]
+    zero, order = ir.Constant(small, [0] * COLUMNS), ir.Constant(small, [*range(COLUMNS)])
+    for room in rooms:
+        b.store(ir.Constant(wide, [0] * COLUMNS), room)
+
+    def seen(place: Value, aside: int) -> Value:
+        at = b.bitcast(b.gep(film, [w.plus(place, aside)]), ir.VectorType(film.type.pointee, COLUMNS).as_pointer())
+        return b.zext(b.load(at, align=1), small)
+
+    def piece(number: Value) -> None:
+        x = start(number)
+        mine, other = w.plus(here, x), w.plus(there, x)
+        slope = b.sub(b.add(seen(mine, 2), seen(mine, 1)), b.add(seen(mine, -1), seen(mine, -2)))
+        # the last piece shows some columns again
+        nothing, again = ir.Constant(small, ir.Undefined), b.sub(w.times(number, COLUMNS), x)
+        again = b.insert_element(nothing, b.trunc(again, small.element), ir.Constant(_INT, 0))
+        again = b.shuffle_vector(again, nothing, _places([0] * COLUMNS))
+        slope = b.select(b.icmp_signed("<", order, again), zero, slope)
+        for room, factor in zip(rooms, [slope, seen(mine, 0), *(seen(other, k - 2) for k in range(6))], strict=True):
+            product = b.mul(b.sext(slope, wide), b.sext(factor, wide))
+            b.store(b.add(b.load(room), product), room)
+
+    w.loop(pieces, piece)
+    kind = ir.FunctionType(wide.element, [wide])
+    total = b.module.declare_intrinsic(f"llvm.vector.reduce.add.v{COLUMNS}i{4 * bits}", fnty=kind)
+    for k, room in enumerate(rooms):
+        at = b.gep(sums, [ir.Constant(_LONG, k)])
+        sum_ = b.call(total, [b.load(room)])
+        b.store(b.add(b.load(at), sum_ if sum_.type == _LONG else b.sext(sum_, _LONG)), at)
+
+
+@_compiled
+def add_products(_, film, here, there, count, sums):  # type: ignore[no-untyped-def]
+    """Add, to eight sums, the products of a row's slope with itself, with its row and with six places of another row.
+
+    The slope is x₂ + x₁ − x₋₁ − x₋₂, the places are −2 … 3, and there are at least `COLUMNS` columns.
+    """
+    return _function((film, here, there, count, sums), _products_of_rows)

@@ -24,6 +24,7 @@ import numpy.typing as npt
 
 from gramoscope.camera.film_line import film_line
 from gramoscope.conventions import Float32Array, FloatArray
+from gramoscope.pickup.film_lanes import COLUMNS, add_products
 from gramoscope.quantile import quantile
 from gramoscope.signal_path import FrameGroup, ImageArray, Texture
 
@@ -35,6 +36,8 @@ LARGEST_STEP_PX = 0.5
 REACH_PX = 3.0
 """How far from its expectation a shift is believed."""
 ROUNDS = 12
+TAPS = 6
+"""Of `quintic_taps`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,59 +203,50 @@ def _textured_rows(image, share, most):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def widen(row, wide):  # type: ignore[no-untyped-def]
-    """Write a row of integers as float32."""
-    for x in range(row.size):
-        wide[x] = row[x]
-
-
-@numba.njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
-def _row_normal_equation(far_before, before, here, after, far_after, taps, t0, t1, t2, t3, t4, t5):  # type: ignore[no-untyped-def]
-    w0, w1, w2, w3, w4, w5 = taps
-    w0, w1, w2 = np.float32(w0), np.float32(w1), np.float32(w2)
-    w3, w4, w5 = np.float32(w3), np.float32(w4), np.float32(w5)
-    square = np.float32(0)
-    cross = np.float32(0)
-    for x in range(here.size):
-        moved = w0 * t0[x] + w1 * t1[x] + w2 * t2[x] + w3 * t3[x] + w4 * t4[x] + w5 * t5[x]
-        gradient = far_after[x] + after[x] - before[x] - far_before[x]
-        square += gradient * gradient
-        cross += gradient * (moved - here[x])
-    return square, cross
+def _add_few_products(film, here, there, count, sums):  # type: ignore[no-untyped-def]
+    """Do what `film_lanes.add_products` does, for few columns."""
+    for x in range(count):
+        one, other = here + x, there + x
+        slope = np.int64(film[one + 2]) + np.int64(film[one + 1]) - np.int64(film[one - 1]) - np.int64(film[one - 2])
+        sums[0] += slope * slope
+        sums[1] += slope * np.int64(film[one])
+        for k in range(TAPS):
+            sums[2 + k] += slope * np.int64(film[other + k - 2])
 
 
 @numba.njit(cache=True, nogil=True)
-def _shift_correction(here, there, rows, shift_px):  # type: ignore[no-untyped-def]
-    width = here.shape[1]
-    start, stop, offset, fraction = placement(shift_px, width, width)
-    # two more taps than `placement` makes room for, and a gradient of five columns
-    start, stop = max(start + 1, 2), min(stop - 1, width - 2)
-    if stop <= start:
-        return 0.0
-    taps = quintic_taps(fraction)
-    wide_here, wide_there = np.empty(width, np.float32), np.empty(width, np.float32)
-    square = 0.0
-    cross = 0.0
-    # slices, for an index that may be negative keeps the loop from being vectorised
-    h = wide_here[start - 2 : stop + 2]
-    t = wide_there[start + offset - 2 : stop + offset + 3]
+def _products(film, here, there, rows, width, start, stop, offset):  # type: ignore[no-untyped-def]
+    """Return what rows of two frames give with each other when they are moved by whole pixels: see `add_products`.
+
+    Frames begin at some places of a film as one line. Sums of products of whole numbers are exact.
+    """
+    sums = np.zeros(2 + TAPS, np.int64)
     for row in rows:
-        widen(here[row], wide_here)
-        widen(there[row], wide_there)
-        s, c = _row_normal_equation(
-            h[:-4], h[1:-3], h[2:-2], h[3:-1], h[4:], taps, t[:-5], t[1:-4], t[2:-3], t[3:-2], t[4:-1], t[5:]
-        )
-        square += s
-        cross += c
-    # the gradient of five columns, (x₂ + x₁ − x₋₁ − x₋₂)/6, without its sixth
-    return 6.0 * cross / square if square > 0 else 0.0
+        one = here + row * width + start
+        other, count = there + row * width + start + offset, stop - start
+        if count >= COLUMNS:
+            add_products(film, one, other, count, sums)
+        else:
+            _add_few_products(film, one, other, count, sums)
+    return sums.astype(np.float64)
 
 
 @numba.njit(cache=True, nogil=True)
-def _pair_shift(here, there, rows, expected_px, reach_px, rounds):  # type: ignore[no-untyped-def]
-    shift_px = expected_px
-    for _ in range(rounds):
-        step = min(max(_shift_correction(here, there, rows, shift_px), -LARGEST_STEP_PX), LARGEST_STEP_PX)
+def _pair_shift(film, here, there, rows, width, expected_px, reach_px, rounds):  # type: ignore[no-untyped-def]
+    """Return the shift that steps lead to; they need the film again only when they come to another whole pixel."""
+    shift_px, seen, products = expected_px, 0, np.zeros(2 + TAPS)
+    for turn in range(rounds):
+        start, stop, offset, fraction = placement(shift_px, width, width)
+        # two more taps than `placement` makes room for, and a gradient of five columns
+        start, stop = max(start + 1, 2), min(stop - 1, width - 2)
+        if turn == 0 or offset != seen:
+            seen, products = offset, _products(film, here, there, rows, width, start, max(start, stop), offset)
+        cross = -products[1]
+        for k, tap in enumerate(quintic_taps(fraction)):
+            cross += tap * products[2 + k]
+        # the gradient of five columns, (x₂ + x₁ − x₋₁ − x₋₂)/6, without its sixth
+        step = 6.0 * cross / products[0] if products[0] > 0 else 0.0
+        step = min(max(step, -LARGEST_STEP_PX), LARGEST_STEP_PX)
         shift_px += step
         if not abs(shift_px - expected_px) <= reach_px or shift_px < 0:
             return np.nan
@@ -262,19 +256,13 @@ def _pair_shift(here, there, rows, expected_px, reach_px, rounds):  # type: igno
 
 
 @numba.njit(cache=True, nogil=True)
-def _frame_of(film, step, shape, k):  # type: ignore[no-untyped-def]
-    return film[k * step : k * step + shape[1] * shape[2]].reshape(shape[1], shape[2])
-
-
-@numba.njit(cache=True, nogil=True)
 def _pair_shifts(film, step, shape, index, expected_px, share):  # type: ignore[no-untyped-def]
-    found_px = np.empty(expected_px.size)
-    here = _frame_of(film, step, shape, index[0])
-    rows = _textured_rows(here, share, ENOUGH_ROWS)
+    found_px, (_, height, width) = np.empty(expected_px.size), shape
+    first = film[index[0] * step : index[0] * step + height * width].reshape(height, width)
+    rows = _textured_rows(first, share, ENOUGH_ROWS)
     for i in range(found_px.size):
-        there = _frame_of(film, step, shape, index[i + 1])
-        found_px[i] = _pair_shift(here, there, rows, expected_px[i], REACH_PX, ROUNDS)
-        here = there
+        here, there = index[i] * step, index[i + 1] * step
+        found_px[i] = _pair_shift(film, here, there, rows, width, expected_px[i], REACH_PX, ROUNDS)
     return found_px
 
 
@@ -323,7 +311,8 @@ def pair_shift_px(
     float
         d in pixels; NaN when the search does not converge within `reach_px`.
     """
-    return float(_pair_shift(here, there, rows, float(expected_px), reach_px, rounds))
+    both = np.stack([here, there])
+    return float(_pair_shift(both.ravel(), 0, here.size, rows, here.shape[1], float(expected_px), reach_px, rounds))
 
 
 def frame_shifts(group: FrameGroup) -> tuple[FloatArray, FloatArray]:
