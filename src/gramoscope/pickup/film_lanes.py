@@ -8,6 +8,7 @@ arrays are C-contiguous and given with the place in them where to begin.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from llvmlite import ir
@@ -19,6 +20,9 @@ PIXELS = 64
 COLUMNS = 32
 """Of so many, products are added at a time; a row has at least as many."""
 PRODUCTS = 8
+SERIES = 9
+SQUARE_ROOT_HALF_BITS = 0x3F3504F3
+"""√½ in single precision, as a whole number."""
 _LONG, _INT = ir.IntType(64), ir.IntType(32)
 _ANY = ir.Constant(ir.VectorType(ir.FloatType(), LANES), ir.Undefined)
 
@@ -261,3 +265,53 @@ def add_products(_, film, here, there, count, sums):  # type: ignore[no-untyped-
     The slope is x₂ + x₁ − x₋₁ − x₋₂, the places are −2 … 3, and there are at least `COLUMNS` columns.
     """
     return _function((film, here, there, count, sums), _products_of_rows)
+
+
+def _logarithms(w: _Writer, number: Value, series: list[Value], gain: Value) -> Value:
+    """Logarithms of positive numbers times a gain: by powers of two, and a series between √½ and √2."""
+    b, whole = w.builder, ir.VectorType(_INT, LANES)
+    bits = b.bitcast(number, whole)
+    shift = ir.Constant(whole, [23] * LANES)
+    power = b.ashr(b.sub(bits, ir.Constant(whole, [SQUARE_ROOT_HALF_BITS] * LANES)), shift)
+    y = b.fsub(b.bitcast(b.sub(bits, b.shl(power, shift)), number.type), w.constant(1.0))
+    value = series[-1]
+    for coefficient in series[-2::-1]:
+        value = w.times_and(value, y, coefficient)
+    twos = w.times_and(b.sitofp(power, number.type), w.constant(math.log(2)), b.fmul(y, value))
+    return b.fmul(gain, twos)
+
+
+def _in_tone(w: _Writer) -> None:
+    grey, count, curve, series, seen = w.arguments
+    b, at_once = w.builder, PIXELS // LANES
+    share, rest, gain = (w.spread(curve, ir.Constant(_LONG, k)) for k in range(3))
+    weight = [w.spread(series, ir.Constant(_LONG, k)) for k in range(SERIES)]
+    zero = w.constant(0.0)
+    black = _logarithms(w, rest, weight, gain)
+    pieces, start = _in_pieces(w, count, PIXELS)
+
+    def piece(number: Value) -> None:
+        x = start(number)
+        places = [w.plus(x, k * LANES) for k in range(at_once)]
+        values = [w.load(grey, place) for place in places]
+        lit = [b.fcmp_ordered(">", value, zero) for value in values]
+        values = [b.select(some, value, zero) for some, value in zip(lit, values, strict=True)]
+        any_ = b.bitcast(b.or_(b.or_(lit[0], lit[1]), b.or_(lit[2], lit[3])), ir.IntType(LANES))
+        with b.if_else(b.icmp_unsigned("!=", any_, ir.Constant(any_.type, 0))) as (then, otherwise):
+            with then:
+                for place, value in zip(places, values, strict=True):
+                    w.store(_logarithms(w, b.fadd(rest, b.fmul(share, value)), weight, gain), seen, place)
+            with otherwise:
+                for place in places:
+                    w.store(black, seen, place)
+
+    w.loop(pieces, piece)
+
+
+@_compiled
+def write_in_tone(_, grey, count, curve, series, seen):  # type: ignore[no-untyped-def]
+    """Write c log(b + a x) of at least `PIXELS` grey levels x, or 0 if they are below it, for a curve (a, b, c).
+
+    Of `SERIES` coefficients of log(1 + y)/y between √½ and √2, the lowest power first. What is black is told at a glance.
+    """
+    return _function((grey, count, curve, series, seen), _in_tone)

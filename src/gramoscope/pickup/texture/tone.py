@@ -16,6 +16,7 @@ from numpy.polynomial import Chebyshev, Polynomial
 
 from gramoscope.conventions import Float32Array, FloatArray
 from gramoscope.errors import require
+from gramoscope.pickup.film_lanes import PIXELS, SERIES, write_in_tone
 
 LEAST_COMPRESSION = 0.01
 """Weaker ones would be lost in single precision."""
@@ -51,13 +52,9 @@ class Tone:
         return seen.reshape(grey.shape)
 
 
-SQUARE_ROOT_HALF_BITS = 0x3F3504F3
-"""√½ in single precision, as a whole number."""
-
-
 def _series() -> Float32Array:
     """Coefficients of log(1 + x)/x between √½ and √2, the lowest power first; good to 2e-7."""
-    near = Chebyshev.interpolate(lambda x: np.log1p(x) / x, 8, domain=[np.sqrt(0.5) - 1, np.sqrt(2) - 1])
+    near = Chebyshev.interpolate(lambda x: np.log1p(x) / x, SERIES - 1, domain=[np.sqrt(0.5) - 1, np.sqrt(2) - 1])
     return near.convert(kind=Polynomial).coef.astype(np.float32)
 
 
@@ -65,44 +62,16 @@ _SERIES = _series()
 
 
 @numba.njit(cache=True, nogil=True)
-def _split(bits, exponent):  # type: ignore[no-untyped-def]
-    """Turn numbers, given by their bits, into ones between √½ and √2 and the powers of two that they have lost."""
-    for i in range(bits.size):
-        power = (bits[i] - SQUARE_ROOT_HALF_BITS) >> 23
-        bits[i] -= power << 23
-        exponent[i] = power
-
-
-@numba.njit(cache=True, nogil=True, fastmath={"contract"})
-def _logarithm(x, exponent, c, gain, out):  # type: ignore[no-untyped-def]
-    c0, c1, c2, c3, c4, c5, c6, c7, c8 = c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8]
-    log_two = np.float32(0.6931471805599453)
-    for i in range(out.size):
-        y = x[i] - np.float32(1)
-        high = c4 + y * (c5 + y * (c6 + y * (c7 + y * c8)))
-        out[i] = gain * (exponent[i] * log_two + y * (c0 + y * (c1 + y * (c2 + y * (c3 + y * high)))))
-
-
-@numba.njit(cache=True, nogil=True)
-def _mix(grey, share, rest, out):  # type: ignore[no-untyped-def]
-    for i in range(out.size):
-        out[i] = rest + share * max(grey[i], np.float32(0))
-
-
-@numba.njit(cache=True, nogil=True)
 def _compress(grey, level, compression, seen):  # type: ignore[no-untyped-def]
-    share, rest = np.float32(compression / level), np.float32(1 - compression)
-    gain = np.float32(level / compression)
-    mixed, exponent = np.empty(BLOCK, np.float32), np.empty(BLOCK, np.float32)
-    for start in range(0, grey.size, BLOCK):
-        stop = min(start + BLOCK, grey.size)
-        part, lost = mixed[: stop - start], exponent[: stop - start]
-        _mix(grey[start:stop], share, rest, part)
-        _split(part.view(np.int32), lost)
-        _logarithm(part, lost, _SERIES, gain, seen[start:stop])
-
-
-BLOCK = 1024
+    """Write how grey levels are seen."""
+    curve = np.array([compression / level, 1 - compression, level / compression], np.float32)
+    if grey.size >= PIXELS:
+        write_in_tone(grey, grey.size, curve, _SERIES, seen)
+        return
+    few, some = np.zeros(PIXELS, np.float32), np.empty(PIXELS, np.float32)
+    few[: grey.size] = grey
+    write_in_tone(few, PIXELS, curve, _SERIES, some)
+    seen[:] = some[: grey.size]
 
 
 def mean_level(pictures: list[Float32Array]) -> float:
