@@ -47,6 +47,22 @@ def test_frames_are_counted_where_all_taps_of_their_interpolation_lie() -> None:
     np.testing.assert_array_equal(frames_in(61, SHIFT_PX), sum((one >= 0) & (one + 3 <= 60) for one in first))
 
 
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+@pytest.mark.parametrize("width", [93, 2500])
+@pytest.mark.parametrize("shift_px", [SHIFT_PX, np.array([0.0, 2.0, 4.5, 6.5])])
+def test_wide_frames_are_added_many_pixels_at_a_time(dtype: type, width: int, shift_px: np.ndarray) -> None:
+    rng = np.random.default_rng(11)
+    images = rng.integers(3, np.iinfo(dtype).max - 3, (4, TILE_ROWS + 3, width)).astype(dtype)
+    laid, canvas = overlay(images, shift_px, NUMBER), register(images, shift_px, NUMBER)
+    np.testing.assert_allclose(laid.columns.T, canvas.mean, rtol=2e-6, atol=1e-4 * np.iinfo(dtype).max / 255)
+
+
+def test_more_frames_of_one_fraction_than_sums_have_room_for_are_added_in_turn() -> None:
+    images = np.full((600, TILE_ROWS, 80), 255, np.uint8)
+    laid = overlay(images, np.zeros(600), np.arange(600))
+    np.testing.assert_allclose(laid.columns, 255, rtol=1e-6)
+
+
 def test_phases_are_few_and_shifts_right_in_the_mean() -> None:
     shift = np.cumsum(np.r_[0.0, np.random.default_rng(2).uniform(1.5, 2.5, 40)])
     near = to_phases(shift)

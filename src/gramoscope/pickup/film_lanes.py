@@ -315,3 +315,35 @@ def write_in_tone(_, grey, count, curve, series, seen):  # type: ignore[no-untyp
     Of `SERIES` coefficients of log(1 + y)/y between √½ and √2, the lowest power first. What is black is told at a glance.
     """
     return _function((grey, count, curve, series, seen), _in_tone)
+
+
+def _sum_of_real_lines(w: _Writer) -> None:
+    first_line, from_, lines, begins, first, number, step, out, place, count = w.arguments
+    b, at_once = w.builder, PIXELS // LANES
+    rooms = w.sums(at_once)
+
+    def piece(index: Value) -> None:
+        x = w.times(index, PIXELS)
+        for k, room in enumerate(rooms):
+            b.store(w.load(first_line, w.plus(w.plus(from_, x), k * LANES)), room)
+
+        def line(i: Value) -> None:
+            there = w.plus(b.load(b.gep(begins, [w.plus(first, w.times(i, step))])), x)
+            for k, room in enumerate(rooms):
+                b.store(b.fadd(b.load(room), w.load(lines, w.plus(there, k * LANES))), room)
+
+        w.loop(number, line)
+        for k, room in enumerate(rooms):
+            w.store(b.load(room), out, w.plus(w.plus(place, x), k * LANES))
+
+    w.loop(b.sdiv(w.plus(count, PIXELS - 1), ir.Constant(_LONG, PIXELS)), piece)
+
+
+@_compiled
+def add_lines(_, first_line, from_, lines, begins, first, number, step, out, place, count):  # type: ignore[no-untyped-def]
+    """Write a line to which others are added, in their order: those that begin at every `step`-th of the places given.
+
+    Up to 63 numbers more than are asked for are read and written.
+    """
+    arguments = (first_line, from_, lines, begins, first, number, step, out, place, count)
+    return _function(arguments, _sum_of_real_lines)

@@ -17,6 +17,7 @@ import numpy as np
 from gramoscope.conventions import INNER, OUTER, Float32Array, FloatArray, IntArray
 from gramoscope.disc.formats import Cut
 from gramoscope.errors import require
+from gramoscope.pickup.film_lanes import PIXELS, add_lines
 from gramoscope.pickup.texture.layout import BOTTOM_PX, StripeLayout, wall_sign
 from gramoscope.pickup.texture.sharpness import ridges
 
@@ -39,6 +40,14 @@ def _add(values, size, out, begin):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
+def _best_of_three(sums, begin, far, price, best, first, size):  # type: ignore[no-untyped-def]
+    """Write some sums, or those so far away, on either side, at a price."""
+    here, there, before, behind = np.uint64(first), np.uint64(begin), np.uint64(begin - far), np.uint64(begin + far)
+    for k in range(np.uint64(size)):
+        best[here + k] = max(sums[there + k], max(sums[before + k], sums[behind + k]) - price)
+
+
+@numba.njit(cache=True, nogil=True)
 def _raise(sums, begin, far, price, best, first, size):  # type: ignore[no-untyped-def]
     """Raise some of the best sums to those so far away, on either side, at a price."""
     here, before, behind = np.uint64(first), np.uint64(begin - far), np.uint64(begin + far)
@@ -47,20 +56,33 @@ def _raise(sums, begin, far, price, best, first, size):  # type: ignore[no-untyp
 
 
 @numba.njit(cache=True, nogil=True)
-def _raise_by_steps(sums, begin, far, count, cost, best, first, size):  # type: ignore[no-untyped-def]
-    """Raise some of the best sums to those up to `count` steps of `far` places away, each at the cost of its square."""
-    for step in range(1, count + 1):
+def _best_by_steps(sums, begin, far, count, cost, best, first, size):  # type: ignore[no-untyped-def]
+    """Write the best sums up to `count` steps of `far` places away, each at the cost of its square."""
+    if count == 0:
+        _copy(sums, begin, size, best, first)
+        return
+    _best_of_three(sums, begin, far, best.dtype.type(cost), best, first, size)
+    for step in range(2, count + 1):
         _raise(sums, begin, step * far, best.dtype.type(cost * step * step), best, first, size)
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_best_of_three(best, begin, far, price, sums, first, size):  # type: ignore[no-untyped-def]
+    """Add what `_best_of_three` says."""
+    here, there, before, behind = np.uint64(first), np.uint64(begin), np.uint64(begin - far), np.uint64(begin + far)
+    for k in range(np.uint64(size)):
+        sums[here + k] += max(best[there + k], max(best[before + k], best[behind + k]) - price)
 
 
 @numba.njit(cache=True, nogil=True)
 def _go_on(sums, begin, line, size, reach, cost, along, new):  # type: ignore[no-untyped-def]
     """Add the best sums of one cell, which begin at a place, to the scores of the next."""
     margin = reach[0] * line
-    _copy(sums, begin, size, along, margin)
-    _raise_by_steps(sums, begin, 1, reach[1], cost[1], along, margin, size)
-    _copy(along, margin, size, new, 0)
-    _raise_by_steps(along, margin, line, reach[0], cost[0], new, 0, size)
+    _best_by_steps(sums, begin, 1, reach[1], cost[1], along, margin, size)
+    if reach[0] == 1:
+        _add_best_of_three(along, margin, line, along.dtype.type(cost[0]), sums, begin + size, size)
+        return
+    _best_by_steps(along, margin, line, reach[0], cost[0], new, 0, size)
     _add(new, size, sums, begin + size)
 
 
@@ -93,7 +115,7 @@ def _room(shape, reach, real):  # type: ignore[no-untyped-def]
     """What paths through so many cells, rows and columns add up in, with a margin after each row that no path enters."""
     cells, rows, columns = shape
     line = columns + reach[1]
-    sums = np.empty(reach[1] + cells * rows * line, real)
+    sums = np.empty(reach[1] + cells * rows * line + PIXELS, real)
     sums[: reach[1]] = -np.inf
     along = np.full((rows + 2 * reach[0]) * line, -np.inf, real)
     return line, sums, along, np.empty(rows * line, real)
@@ -121,10 +143,40 @@ def best_path(score, largest_step, step_cost):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _add_above(values, first, level, begin, count, sums):  # type: ignore[no-untyped-def]
+def _write_above(values, first, level, count, lines, begin):  # type: ignore[no-untyped-def]
     here, there = np.uint64(first), np.uint64(begin)
     for k in range(np.uint64(count)):
-        sums[there + k] += values[here + k] - level
+        lines[there + k] = values[here + k] - level
+
+
+@numba.njit(cache=True, nogil=True)
+def _views(looks, first_row, seen_rows, line, shape):  # type: ignore[no-untyped-def]
+    """Return what is seen of ridges of such a shape, each kind of view once, and where displacements begin in it.
+
+    A view is (where it begins in the ridges of the first cell, how much is seen, where that begins in a line of its own);
+    outside it nothing is seen. Lines of views lie one after the other, `length` apart.
+    """
+    stripes, verticals = first_row.shape
+    cells, thirds = shape
+    lowest = np.min(first_row) // GRID_PX
+    length = np.max(first_row) // GRID_PX - lowest + line + PIXELS
+    views, begins, count = np.empty((stripes * verticals, 3), np.int64), np.empty((verticals, stripes), np.int64), 0
+    for i in range(stripes):
+        for v in range(verticals):
+            part = first_row[i, v] % GRID_PX
+            first = max(-((part - seen_rows[i, v, 0]) // GRID_PX), lowest)
+            seen = max(min((seen_rows[i, v, 1] - part) // GRID_PX + 1, lowest + length) - first, 0)
+            there = (looks[i, v] * GRID_PX + part) * cells * thirds + first
+            known = 0
+            while known < count and not (
+                views[known, 0] == there and views[known, 1] == seen and views[known, 2] == first - lowest
+            ):
+                known += 1
+            if known == count:
+                views[count] = there, seen, first - lowest
+                count += 1
+            begins[v, i] = known * length + first_row[i, v] // GRID_PX - lowest
+    return views[:count], begins.reshape(begins.size), length
 
 
 @numba.njit(cache=True, nogil=True)
@@ -137,23 +189,21 @@ def _common_path(coarse, swing, looks, first_row, seen_rows, absent, largest_ste
     """
     _, _, cells, thirds = coarse.shape
     verticals, laterals = swing.shape
-    shape = (cells, verticals, laterals)
+    shape, stripes = (cells, verticals, laterals), len(first_row)
     line, sums, along, new = _room(shape, largest_step, coarse.dtype)
-    usual = np.full((verticals, line), -np.inf, coarse.dtype)
-    usual[:, :laterals] = -swing
+    usual = np.full((verticals + PIXELS // line + 1, line), -np.inf, coarse.dtype)
+    usual[:verticals, :laterals] = -swing
     costs, ridges_, size = usual.reshape(usual.size), coarse.reshape(coarse.size), verticals * line
+    views, begins, length = _views(looks, first_row, seen_rows, line, (cells, thirds))
+    # out of sight a stripe adds nothing
+    seen = np.zeros(len(views) * length, coarse.dtype)
     for cell in range(cells):
         begin = largest_step[1] + cell * size
-        _copy(costs, 0, size, sums, begin)
-        for i in range(len(first_row)):
-            for v in range(verticals):
-                low, high = seen_rows[i, v]
-                start = max(0, -((first_row[i, v] - low) // GRID_PX))
-                count = min(laterals, (high - first_row[i, v]) // GRID_PX + 1) - start
-                row = first_row[i, v] + GRID_PX * start
-                if count > 0:
-                    there = ((looks[i, v] * GRID_PX + row % GRID_PX) * cells + cell) * thirds + row // GRID_PX
-                    _add_above(ridges_, there, absent, begin + v * line + start, count, sums)
+        for k in range(len(views)):
+            there, count, first = views[k]
+            _write_above(ridges_, there + cell * thirds, absent, count, seen, k * length + first)
+        for v in range(verticals):
+            add_lines(costs, v * line, seen, begins, v * stripes, stripes, 1, sums, begin + v * line, line)
         if cell > 0:
             _go_on(sums, begin - size, line, size, largest_step, step_cost, along, new)
     return _way_back(sums, largest_step[1], shape, line, largest_step, step_cost)
