@@ -19,7 +19,7 @@ from scipy import optimize
 from gramoscope.conventions import FloatArray, IntArray
 from gramoscope.tonearm.groove_prior import GroovePrior
 from gramoscope.tonearm.level import LEAST_SAMPLES, OneDirection, slope_power
-from gramoscope.tonearm.steady_likelihood import PlaceReadings, one_after_the_other, steady_log_likelihood
+from gramoscope.tonearm.place_likelihood import PlaceReadings, abreast, place_log_likelihood
 
 GATE = 4.0
 """Samples further than this many standard errors from their prediction count as if they lay right there."""
@@ -123,7 +123,7 @@ def lessons(stretches: Iterable[Lesson], step_m: float, *, block: int = 1) -> Le
     power = [slope_power(lesson.seen, step_m) for lesson, _ in seen]
     readings = [_counted_from_the_first(means, lesson.correlation_samples) for lesson, means in seen]
     level = np.array([lesson.level for lesson, _ in seen])
-    return Lessons(block * step_m, one_after_the_other(readings), level, np.array(power))
+    return Lessons(block * step_m, abreast(readings), level, np.array(power))
 
 
 def _means(one: OneDirection, block: int) -> OneDirection:
@@ -170,7 +170,7 @@ def learn(given: Lessons | None, limits: PriorLimits, *, before: GroovePrior | N
         # the slopes of each stretch, of their bodies
         sigma = np.maximum(prior.share * given.level, prior.floor) / prior.bend(given.step_m)
         disbelief = 0.5 * float(change @ change) + 0.5 * _louder(sigma[heard], power) ** 2
-        return disbelief - steady_log_likelihood(
+        return disbelief - place_log_likelihood(
             prior.steps(given.step_m),
             prior.at_rest(given.step_m),
             given.readings,

@@ -23,11 +23,11 @@ _ANY = ir.Constant(_ROW, ir.Undefined)
 _EACH = range(STATES)
 Value = Any
 """Of LLVM, in the making."""
-_compiled: Any = intrinsic
+compiled: Any = intrinsic
 """Numba's own types count the context, which only the compiler gives, as an argument."""
 
 
-class _Writer:
+class Writer:
     """Writes code about the rows of matrices, which are counted 0, 1, … in the order of the arguments."""
 
     def __init__(self, context: Any, builder: Any, signature: Any, arguments: Any) -> None:
@@ -67,6 +67,10 @@ class _Writer:
         """A number, in all places of a row."""
         return self.choose(self.builder.insert_element(_ANY, value, ir.Constant(_INT, 0)), _ANY, [0] * STATES)
 
+    def number(self, value: float) -> Value:
+        """A number that is known beforehand, in all places of a row."""
+        return ir.Constant(_ROW, [value] * STATES)
+
     def choose(self, one: Value, other: Value, which: list[int]) -> Value:
         """Elements of two rows; those of the other count from 8."""
         mask = ir.Constant(ir.VectorType(_INT, STATES), [ir.Constant(_INT, i) for i in which])
@@ -88,6 +92,10 @@ class _Writer:
                 rows[i + far] = self.choose(one, other, [STATES + j if j & far else j + far for j in _EACH])
         return rows
 
+    def less(self, one: Value, other: Value) -> Value:
+        """Where one row is less than the other; nowhere where either is NaN."""
+        return self.builder.fcmp_ordered("<", one, other)
+
     def total(self, row: Value) -> Value:
         """The sum of a row."""
         for far in (4, 2, 1):
@@ -95,17 +103,17 @@ class _Writer:
         return self.builder.extract_element(row, ir.Constant(_INT, 0))
 
 
-def _function(result: Any, arguments: tuple[Any, ...], write: Callable[[_Writer], Value]) -> Any:
+def function(result: Any, arguments: tuple[Any, ...], write: Callable[[Writer], Value]) -> Any:
     """Signature and code of a function that Numba can call."""
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Value:
-        written = write(_Writer(context, builder, signature, values))
+        written = write(Writer(context, builder, signature, values))
         return context.get_dummy_value() if written is None else written
 
     return result(*arguments), generate
 
 
-def _matrix_product(write: _Writer) -> None:
+def _matrix_product(write: Writer) -> None:
     x = [write.load(1, k) for k in _EACH]
     for i in _EACH:
         total = write.builder.fmul(write.spread(0, i, 0), x[0])
@@ -114,7 +122,7 @@ def _matrix_product(write: _Writer) -> None:
         write.store(total, 2, i)
 
 
-def _vector_product(write: _Writer) -> None:
+def _vector_product(write: Writer) -> None:
     even, odd = write.load(2), write.builder.fmul(write.spread(0, 0, 1), write.load(1, 1))
     for k in _EACH[::2]:
         even = write.times_and(write.spread(0, 0, k), write.load(1, k), even)
@@ -123,7 +131,7 @@ def _vector_product(write: _Writer) -> None:
     write.store(write.builder.fadd(even, odd), 2)
 
 
-def _quadratic_form(write: _Writer) -> Value:
+def _quadratic_form(write: Writer) -> Value:
     """Both halves of the product at once, each as two sums: nothing waits for what it has just written."""
     halves = 2
     h = [write.spread(0, 0, k) for k in range(halves * STATES)]
@@ -139,84 +147,84 @@ def _quadratic_form(write: _Writer) -> Value:
     return write.total(write.builder.fadd(*seen))
 
 
-def _outer_product(write: _Writer) -> None:
+def _outer_product(write: Writer) -> None:
     y = write.load(1)
     for i in _EACH:
         write.store(write.times_and(write.spread(0, 0, i), y, write.load(2, i)), 2, i)
 
 
-def _multiple(write: _Writer) -> None:
+def _multiple(write: Writer) -> None:
     write.store(write.builder.fmul(write.everywhere(write.numbers[0]), write.load(0)), 1)
 
 
-def _sum_with_multiple(write: _Writer) -> None:
+def _sum_with_multiple(write: Writer) -> None:
     write.store(write.times_and(write.everywhere(write.numbers[0]), write.load(0), write.load(1)), 1)
 
 
-def _inner_product(write: _Writer) -> Value:
+def _inner_product(write: Writer) -> Value:
     return write.total(write.builder.fmul(write.load(0), write.load(1)))
 
 
-def _transposition(write: _Writer) -> None:
+def _transposition(write: Writer) -> None:
     for i, row in enumerate(write.transposed([write.load(0, k) for k in _EACH])):
         write.store(row, 1, i)
 
 
-def _symmetry(write: _Writer) -> None:
+def _symmetry(write: Writer) -> None:
     rows = [write.load(0, k) for k in _EACH]
     for i, column in enumerate(write.transposed(rows)):
         write.store(write.choose(rows[i], column, [j if j <= i else STATES + j for j in _EACH]), 0, i)
 
 
-@_compiled
+@compiled
 def multiply(_, a, a_row, a_column, x, x_row, x_column, out, row, column):  # type: ignore[no-untyped-def]
     """Write a x; the result may lie where a does."""
-    return _function(types.void, (a, a_row, a_column, x, x_row, x_column, out, row, column), _matrix_product)
+    return function(types.void, (a, a_row, a_column, x, x_row, x_column, out, row, column), _matrix_product)
 
 
-@_compiled
+@compiled
 def add_row_times(_, h, h_row, h_column, x, x_row, x_column, out, row, column):  # type: ignore[no-untyped-def]
     """Add the vector h x to another."""
-    return _function(types.void, (h, h_row, h_column, x, x_row, x_column, out, row, column), _vector_product)
+    return function(types.void, (h, h_row, h_column, x, x_row, x_column, out, row, column), _vector_product)
 
 
-@_compiled
+@compiled
 def quadratic_form(_, h, h_row, h_column, p, p_row, p_column, out, row, column):  # type: ignore[no-untyped-def]
     """Write p h for a symmetric p of 16 × 16 and a vector of as many, and return hᵀ p h."""
-    return _function(types.float64, (h, h_row, h_column, p, p_row, p_column, out, row, column), _quadratic_form)
+    return function(types.float64, (h, h_row, h_column, p, p_row, p_column, out, row, column), _quadratic_form)
 
 
-@_compiled
+@compiled
 def add_outer(_, x, x_row, x_column, y, y_row, y_column, out, row, column):  # type: ignore[no-untyped-def]
     """Add the matrix x yᵀ to another."""
-    return _function(types.void, (x, x_row, x_column, y, y_row, y_column, out, row, column), _outer_product)
+    return function(types.void, (x, x_row, x_column, y, y_row, y_column, out, row, column), _outer_product)
 
 
-@_compiled
+@compiled
 def multiple(_, c, x, x_row, x_column, out, row, column):  # type: ignore[no-untyped-def]
     """Write the vector c x; the result may lie where x does."""
-    return _function(types.void, (c, x, x_row, x_column, out, row, column), _multiple)
+    return function(types.void, (c, x, x_row, x_column, out, row, column), _multiple)
 
 
-@_compiled
+@compiled
 def add_multiple(_, c, x, x_row, x_column, out, row, column):  # type: ignore[no-untyped-def]
     """Add the vector c x to another."""
-    return _function(types.void, (c, x, x_row, x_column, out, row, column), _sum_with_multiple)
+    return function(types.void, (c, x, x_row, x_column, out, row, column), _sum_with_multiple)
 
 
-@_compiled
+@compiled
 def inner(_, x, x_row, x_column, y, y_row, y_column):  # type: ignore[no-untyped-def]
     """Return x·y."""
-    return _function(types.float64, (x, x_row, x_column, y, y_row, y_column), _inner_product)
+    return function(types.float64, (x, x_row, x_column, y, y_row, y_column), _inner_product)
 
 
-@_compiled
+@compiled
 def transpose(_, x, x_row, x_column, out, row, column):  # type: ignore[no-untyped-def]
     """Write xᵀ."""
-    return _function(types.void, (x, x_row, x_column, out, row, column), _transposition)
+    return function(types.void, (x, x_row, x_column, out, row, column), _transposition)
 
 
-@_compiled
+@compiled
 def mirror(_, x, x_row, x_column):  # type: ignore[no-untyped-def]
     """Make x symmetric, by what is on and below its diagonal."""
-    return _function(types.void, (x, x_row, x_column), _symmetry)
+    return function(types.void, (x, x_row, x_column), _symmetry)

@@ -7,7 +7,7 @@ import pytest
 
 from gramoscope.tonearm.groove_prior import GroovePrior, start, taylor
 from gramoscope.tonearm.linear_gaussian import Gate, Moves, Readings, blank, forward
-from gramoscope.tonearm.steady_likelihood import one_after_the_other, steady_log_likelihood
+from gramoscope.tonearm.place_likelihood import abreast, place_log_likelihood
 
 STEP_M = 3.1e-6
 SIGMA_M = 6e-8
@@ -22,10 +22,10 @@ def _both(prior: GroovePrior, bins: np.ndarray, value: np.ndarray, variance: np.
     count = int(bins[-1]) + 1
     moves = Moves(a[None, None], sigma**2 * q[None, None], np.zeros(count, np.int64), np.ones(count))
     long = forward(moves, readings, blank(covariance), gate=Gate(4.0)).log_likelihood
-    short = steady_log_likelihood(
+    short = place_log_likelihood(
         (a, q),
         prior.at_rest(STEP_M),
-        one_after_the_other([(bins, value, variance)]),
+        abreast([(bins, value, variance)]),
         np.array([sigma]),
         place_sigma_m=1e-4,
         gate=4.0,
@@ -39,10 +39,10 @@ def test_stretches_know_nothing_of_each_other() -> None:
     sigma = np.array([0.02, 0.05])
 
     def likelihood(some: slice) -> float:
-        return steady_log_likelihood(
+        return place_log_likelihood(
             prior.steps(STEP_M),
             prior.at_rest(STEP_M),
-            one_after_the_other(stretches[some]),
+            abreast(stretches[some]),
             sigma[some],
             place_sigma_m=1e-4,
             gate=4.0,
