@@ -3,7 +3,8 @@
 A first pass leaves out what disagrees with its nearest neighbours, and rejects what is further than the gate from its
 prediction; while it rejects, its error grows as fast as grooves move, so it cannot lose the groove for good. Smoothed
 backwards, that tells of each reading how far it lies from what all others say, and by this it is accepted or rejected once
-more, for a second pass, and so on until nothing changes. So what was rejected because the prediction was bad comes back.
+more, for a second pass, and so on until nothing changes. So what was rejected because the prediction was bad comes back. A
+first pass that lost nothing and of which nothing changes is the second one, to the last bit.
 """
 
 from __future__ import annotations
@@ -170,7 +171,7 @@ class Followed:
     Attributes
     ----------
     smoothed : Smoothed
-        Slopes of both directions, times the step.
+        What was wanted.
     accepted : bool array, shape (reading,)
     state : PassState
         Where to go on.
@@ -182,7 +183,14 @@ class Followed:
 
 
 def robustly(
-    steps: Moves, readings: Readings, trusted: BoolArray, begin: PassState, *, gate: float, resume_bin: int
+    steps: Moves,
+    readings: Readings,
+    trusted: BoolArray,
+    begin: PassState,
+    *,
+    gate: float,
+    resume_bin: int,
+    wanted: FloatArray | None = None,
 ) -> Followed:
     """Smooth the groove by readings some of which are wild.
 
@@ -197,6 +205,8 @@ def robustly(
         Standard deviations.
     resume_bin : int
         Where to go on later, counted as `begin.bin` is.
+    wanted : float64 array, optional
+        What shall be smoothed, see `forward`; nothing if left out.
 
     Returns
     -------
@@ -204,11 +214,13 @@ def robustly(
     """
     resume = resume_bin - begin.bin
     rule = Gate(gate, PATIENCE, ANYWHERE_M, DOUBT)
-    first = forward(steps, readings, begin.first, gate=rule, allowed=trusted, resume=resume)
-    accepted = backward(steps, readings, first).distance <= gate
+    first = last = forward(steps, readings, begin.first, gate=rule, allowed=trusted, wanted=wanted, resume=resume)
+    smoothed = backward(steps, readings, first)
+    used = accepted = smoothed.distance <= gate
     lost, missed = _where_it_was_lost(first, readings)
     accepted |= missed & trusted
-    for _ in range(ROUNDS):
+    settled = _alike(begin.first, begin.last) and not first.lost.any() and np.array_equal(first.used, accepted)
+    for _ in range(0 if settled else ROUNDS):
         last = forward(
             steps,
             readings,
@@ -216,7 +228,7 @@ def robustly(
             gate=Gate(anywhere=ANYWHERE_M),
             allowed=accepted,
             lost=lost,
-            wanted=SLOPES,
+            wanted=wanted,
             resume=resume,
         )
         smoothed = backward(steps, readings, last)
@@ -224,6 +236,11 @@ def robustly(
         if np.array_equal(used, accepted):
             break
     return Followed(smoothed, used, PassState(resume_bin, first.resume, last.resume))
+
+
+def _alike(one: FilterState, other: FilterState) -> bool:
+    """Whether two filters know the same."""
+    return np.array_equal(one.mean, other.mean) and np.array_equal(one.covariance, other.covariance)
 
 
 def _where_it_was_lost(first: Filtered, readings: Readings) -> tuple[BoolArray, BoolArray]:

@@ -24,7 +24,7 @@ from gramoscope.signal_path import ErrorSpectrum, GrooveMotion, WallTrace
 from gramoscope.tonearm.course import Course
 from gramoscope.tonearm.error_spectrum import places_error
 from gramoscope.tonearm.grid_flags import OUTLIER, grid_flags
-from gramoscope.tonearm.groove_model import GrooveModel, PassState, beginning, moves, robustly, which
+from gramoscope.tonearm.groove_model import SLOPES, GrooveModel, PassState, beginning, moves, robustly, which
 from gramoscope.tonearm.place_samples import PlaceSamples, joined
 from gramoscope.tonearm.stretches import counted_from_the_start, handed_over, stretch_of
 from gramoscope.tonearm.teacher import DIRECTIONS, Teacher, Teaching
@@ -169,6 +169,7 @@ class _PlaceFollower:
             state,
             gate=self.smoother.gate,
             resume_bin=min(stop, end - 1),
+            wanted=SLOPES,
         )
         flags = samples.flags.copy()
         flags[measured[~followed.accepted]] |= OUTLIER
