@@ -17,12 +17,11 @@ from typing import Any
 
 from numba import types
 
-from gramoscope.tonearm.groove_prior import BODY, ORDER, WIDE, WIDE_POLES
-from gramoscope.tonearm.vector_rows import STATES, Value, Writer, compiled, function
+from gramoscope.tonearm.vector_rows import PARTS, STATES, Value, Writer, compiled, function
 
 FILTERS = STATES
 """As many as states, so that both fill a row."""
-MOVED_BY = (range(STATES), *[range(BODY, WIDE)] * ORDER, *[range(WIDE, STATES)] * WIDE_POLES)
+MOVED_BY = (range(STATES), *[part for part in PARTS for _ in part])
 """On which states each depends a step later."""
 MEAN = STATES * (STATES + 1) // 2
 """First row of the mean."""

@@ -22,7 +22,7 @@ from scipy import linalg
 
 from gramoscope.conventions import FloatArray
 from gramoscope.tonearm.linear_gaussian import Filtered, FilterState, Moves, Readings
-from gramoscope.tonearm.small_matrices import STATES, add_products, block_sandwich, block_vector, dot, times
+from gramoscope.tonearm.small_matrices import add_products, block_sandwich, block_vector, dot, times
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,13 +68,13 @@ def _far(away, ph, j, expected, variance, r, n, nph):  # type: ignore[no-untyped
 def _smooth(a, at, model, places, h, value, variance, gate_variance, used, nu, spread, gain, expected, means, want, toward, mean, sigma, off):  # type: ignore  # fmt: skip  # noqa: E501
     size = means.shape[1]
     r, r_next, n, n_next = np.zeros(size), np.zeros(size), np.zeros((size, size)), np.zeros((size, size))
-    half, one = np.empty((STATES, STATES)), np.empty(size)
+    one = np.empty(size)
     j = places.size - 1
     for k in range(means.shape[0] - 1, -1, -1):
         r, r_next = r_next, r
         n, n_next = n_next, n
         block_vector(a, size * model[k], r_next, r)
-        block_sandwich(at, a, size * model[k], n_next, half, n)
+        block_sandwich(at, size * model[k], n_next, n)
         last = j
         while j >= 0 and places[j] == k:
             if used[j]:

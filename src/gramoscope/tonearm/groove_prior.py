@@ -28,13 +28,13 @@ import numba
 import numpy as np
 
 from gramoscope.conventions import FloatArray
-from gramoscope.tonearm.vector_rows import STATES, multiply, transpose
+from gramoscope.tonearm.vector_rows import PARTS, STATES, multiply, transpose
 
 ORDER, WIDE_POLES = 4, 3
 """Poles of u, two at λ and two at μ, and of v."""
 BODY, WIDE = 1, 1 + ORDER
 """Where u and v (times Δ) stand in the state."""
-assert STATES == 1 + ORDER + WIDE_POLES
+assert PARTS == (range(BODY, WIDE), range(WIDE, STATES)) and STATES == WIDE + WIDE_POLES
 SLOPE = np.zeros(STATES)
 """The slope (times Δ) is this row times the state."""
 SLOPE[[BODY, WIDE]] = 1.0

@@ -177,9 +177,9 @@ class Filtered:
 
 
 @numba.njit(cache=True, nogil=True)
-def _move(a, at, q, first, agitation, m, p, half, m_out, p_out):  # type: ignore[no-untyped-def]
+def _move(a, at, q, first, agitation, m, p, m_out, p_out):  # type: ignore[no-untyped-def]
     block_vector(at, first, m, m_out)
-    block_sandwich(a, at, first, p, half, p_out)
+    block_sandwich(a, first, p, p_out)
     for b in range(0, m.size, STATES):
         for i in range(b, b + STATES):
             for j in range(STATES):
@@ -240,7 +240,7 @@ def _before_others(h, j, ph, first, used, spread, gain):  # type: ignore[no-unty
 def _filter(a, at, q, model, agitation, places, source, h, value, variance, gate_variance, rule, allowed, lost, m, p, missed, since, want, means, toward, misses, sinces, used, nu, spread, gain, expected, resume, m_resume, p_resume):  # type: ignore  # fmt: skip  # noqa: E501
     width, patience, anywhere, doubt = rule
     size, wanted = m.size, want.shape[0]
-    half, ph, m_next, p_next = np.empty((STATES, STATES)), np.empty_like(m), np.empty_like(m), np.empty_like(p)
+    ph, m_next, p_next = np.empty_like(m), np.empty_like(m), np.empty_like(p)
     loglik = 0.0
     j = 0
     for k in range(means.shape[0]):
@@ -268,7 +268,7 @@ def _filter(a, at, q, model, agitation, places, source, h, value, variance, gate
             if not used[j]:
                 scaled(1.0, ph, 0, gain, j, size)
             j += 1
-        _move(a, at, q, size * model[k], agitation[k], m, p, half, m_next, p_next)
+        _move(a, at, q, size * model[k], agitation[k], m, p, m_next, p_next)
         m, m_next = m_next, m
         p, p_next = p_next, p
     return loglik

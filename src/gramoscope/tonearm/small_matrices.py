@@ -14,27 +14,22 @@ from gramoscope.tonearm.vector_rows import (
     add_outer,
     add_row_times,
     inner,
-    mirror,
     multiple,
-    multiply,
     quadratic_form,
-    transpose,
+    sandwich,
+    sandwich_across,
 )
 
 __all__ = ["STATES", "add_products", "add_scaled", "block_sandwich", "block_vector", "dot", "scaled", "times"]
 
 
 @numba.njit(cache=True, nogil=True)
-def block_sandwich(a, at, first, x, half, out):  # type: ignore[no-untyped-def]
-    """Write A x Aᵀ for symmetric x and a block diagonal A, given with its transpose."""
+def block_sandwich(a, first, x, out):  # type: ignore[no-untyped-def]
+    """Write A x Aᵀ for symmetric x and a block diagonal A of transitions, or of their transposes."""
     for b in range(0, x.shape[0], STATES):
-        for c in range(0, b + 1, STATES):
-            multiply(a, first + b, 0, x, b, c, half, 0, 0)
-            multiply(half, 0, 0, at, first + c, 0, out, b, c)
-            if b == c:
-                mirror(out, b, b)
-            else:
-                transpose(out, b, c, out, c, b)
+        sandwich(a, first + b, 0, x, b, b, out, b, b)
+        for c in range(0, b, STATES):
+            sandwich_across(a, first + b, 0, a, first + c, 0, x, b, c, out, b, c, out, c, b)
 
 
 @numba.njit(cache=True, nogil=True)

@@ -17,6 +17,10 @@ from numba.extending import intrinsic
 
 STATES = 8
 """Length of a row."""
+PARTS = (range(1, 5), range(5, 8))
+"""Of a state: what moves by itself, but for the first number of all, which all others move."""
+COUPLED = (range(STATES), *[(0, *part) for part in PARTS for _ in part])
+"""Columns of a transition, or of its transpose, that are not zero, for each of its rows."""
 _DOUBLE, _LONG, _INT = ir.DoubleType(), ir.IntType(64), ir.IntType(32)
 _ROW = ir.VectorType(_DOUBLE, STATES)
 _ANY = ir.Constant(_ROW, ir.Undefined)
@@ -122,6 +126,35 @@ def _matrix_product(write: Writer) -> None:
         write.store(total, 2, i)
 
 
+def _sandwich(write: Writer, a: int, b: int, x: int) -> list[Value]:
+    """The rows of b (a x)ᵀ for transitions a and b; what is zero in them is left out."""
+
+    def moved(matrix: int, rows: list[Value]) -> list[Value]:
+        out = []
+        for i in _EACH:
+            total = write.builder.fmul(write.spread(matrix, i, 0), rows[0])
+            for k in COUPLED[i][1:]:
+                total = write.times_and(write.spread(matrix, i, k), rows[k], total)
+            out.append(total)
+        return out
+
+    return moved(b, write.transposed(moved(a, [write.load(x, k) for k in _EACH])))
+
+
+def _square_sandwich(write: Writer) -> None:
+    """Made symmetric by what is on and above the diagonal: products that the other order has on and below it."""
+    rows = _sandwich(write, 0, 0, 1)
+    for i, column in enumerate(write.transposed(rows)):
+        write.store(write.choose(column, rows[i], [j if j <= i else STATES + j for j in _EACH]), 2, i)
+
+
+def _cross_sandwich(write: Writer) -> None:
+    rows = _sandwich(write, 0, 1, 2)
+    for i, column in enumerate(write.transposed(rows)):
+        write.store(column, 3, i)
+        write.store(rows[i], 4, i)
+
+
 def _vector_product(write: Writer) -> None:
     even, odd = write.load(2), write.builder.fmul(write.spread(0, 0, 1), write.load(1, 1))
     for k in _EACH[::2]:
@@ -170,16 +203,23 @@ def _transposition(write: Writer) -> None:
         write.store(row, 1, i)
 
 
-def _symmetry(write: Writer) -> None:
-    rows = [write.load(0, k) for k in _EACH]
-    for i, column in enumerate(write.transposed(rows)):
-        write.store(write.choose(rows[i], column, [j if j <= i else STATES + j for j in _EACH]), 0, i)
-
-
 @compiled
 def multiply(_, a, a_row, a_column, x, x_row, x_column, out, row, column):  # type: ignore[no-untyped-def]
     """Write a x; the result may lie where a does."""
     return function(types.void, (a, a_row, a_column, x, x_row, x_column, out, row, column), _matrix_product)
+
+
+@compiled
+def sandwich_across(_, a, a_row, a_column, b, b_row, b_column, x, x_row, x_column, out, row, column, turned, turned_row, turned_column):  # type: ignore  # fmt: skip  # noqa: E501
+    """Write a x bᵀ for transitions, or their transposes (`COUPLED`), and its own transpose."""
+    rows = (a, a_row, a_column, b, b_row, b_column, x, x_row, x_column)
+    return function(types.void, (*rows, out, row, column, turned, turned_row, turned_column), _cross_sandwich)
+
+
+@compiled
+def sandwich(_, a, a_row, a_column, x, x_row, x_column, out, row, column):  # type: ignore[no-untyped-def]
+    """Write a x aᵀ for a symmetric x and a transition a, or its transpose (`COUPLED`)."""
+    return function(types.void, (a, a_row, a_column, x, x_row, x_column, out, row, column), _square_sandwich)
 
 
 @compiled
@@ -222,9 +262,3 @@ def inner(_, x, x_row, x_column, y, y_row, y_column):  # type: ignore[no-untyped
 def transpose(_, x, x_row, x_column, out, row, column):  # type: ignore[no-untyped-def]
     """Write xᵀ."""
     return function(types.void, (x, x_row, x_column, out, row, column), _transposition)
-
-
-@compiled
-def mirror(_, x, x_row, x_column):  # type: ignore[no-untyped-def]
-    """Make x symmetric, by what is on and below its diagonal."""
-    return function(types.void, (x, x_row, x_column), _symmetry)
