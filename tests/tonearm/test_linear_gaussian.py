@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gramoscope.tonearm.bryson_frazier import backward, smooth_reference
+from gramoscope.tonearm.groove_model import PassState, robustly
 from gramoscope.tonearm.groove_prior import SLOPE, GroovePrior, start
 from gramoscope.tonearm.linear_gaussian import (
     FilterState,
@@ -209,3 +210,18 @@ def test_a_place_that_is_lost_may_be_anywhere_and_goes_on_as_fast_as_before() ->
     assert np.abs(smoothed.mean[:, 0] / STEP_M - 5e-3).max() < 5e-3
     # without the patience it stays lost, for this prior does not believe in such a jump
     assert not forward(moves, readings, _begin(), gate=Gate(5.0)).used[200:].any()
+
+
+@pytest.mark.parametrize("wild", [0, 1])
+def test_what_is_followed_robustly_is_the_pass_over_what_was_accepted(wild: int) -> None:
+    moves, readings, all_of_them = _moves(), _readings(), np.ones(75, np.bool_)
+    readings.value[30] += 2e-3 * wild
+    begin = PassState(0, _begin(), _begin())
+    followed = robustly(moves, readings, all_of_them, begin, gate=40.0, resume_bin=20, wanted=SLOPES)
+    last = forward(moves, readings, _begin(), allowed=followed.accepted, wanted=SLOPES, resume=20)
+    again = backward(moves, readings, last)
+    assert np.count_nonzero(~followed.accepted) == wild
+    np.testing.assert_array_equal(followed.smoothed.mean, again.mean)
+    np.testing.assert_array_equal(followed.smoothed.sigma, again.sigma)
+    np.testing.assert_array_equal(followed.state.last.mean, last.resume.mean)
+    np.testing.assert_array_equal(followed.state.last.covariance, last.resume.covariance)

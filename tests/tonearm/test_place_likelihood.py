@@ -35,8 +35,10 @@ def _both(prior: GroovePrior, bins: np.ndarray, value: np.ndarray, variance: np.
 
 def test_stretches_know_nothing_of_each_other() -> None:
     prior, rng = GroovePrior(5000.0, 3e4, 6e4, 0.03, 1.0, 2e-4), np.random.default_rng(2)
-    stretches = [(np.arange(n), 2e-7 * rng.normal(size=n), np.full(n, SIGMA_M**2)) for n in (70, 41)]
-    sigma = np.array([0.02, 0.05])
+    # more than one eight of them, of all lengths
+    lengths = rng.integers(1, 90, 11)
+    stretches = [(np.arange(n), 2e-7 * rng.normal(size=n), np.full(n, SIGMA_M**2)) for n in lengths]
+    sigma = rng.uniform(0.02, 0.05, 11)
 
     def likelihood(some: slice) -> float:
         return place_log_likelihood(
@@ -48,8 +50,8 @@ def test_stretches_know_nothing_of_each_other() -> None:
             gate=4.0,
         )
 
-    apart = likelihood(slice(0, 1)) + likelihood(slice(1, 2))
-    assert likelihood(slice(0, 2)) == pytest.approx(apart, rel=1e-12)
+    apart = sum(likelihood(slice(i, i + 1)) for i in range(11))
+    assert likelihood(slice(0, 11)) == pytest.approx(apart, rel=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(3))

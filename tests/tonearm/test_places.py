@@ -12,6 +12,7 @@ from gramoscope.errors import ArgumentError
 from gramoscope.quality import Quality
 from gramoscope.signal_path import WallTrace
 from gramoscope.tonearm.follow import PlaceSmoother, Tonearm
+from gramoscope.tonearm.place_samples import _both_directions
 
 LATERAL, VERTICAL = 0, 1
 GROUPS = 40
@@ -359,3 +360,8 @@ def test_impossible_smoothers_are_refused() -> None:
     ):
         with pytest.raises(ArgumentError):
             PlaceSmoother(**setting)
+
+
+def test_a_reading_of_either_wall_sees_both_directions() -> None:
+    row, gain = np.random.default_rng(4).normal(size=(5, 8)), np.array([-0.9, 1.1, 1.1, -0.9, 1.1])
+    np.testing.assert_array_equal(_both_directions(row, gain), np.hstack([row, row * gain[:, None]]))

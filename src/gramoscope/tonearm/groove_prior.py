@@ -34,7 +34,7 @@ ORDER, WIDE_POLES = 4, 3
 """Poles of u, two at λ and two at μ, and of v."""
 BODY, WIDE = 1, 1 + ORDER
 """Where u and v (times Δ) stand in the state."""
-assert PARTS == (range(BODY, WIDE), range(WIDE, STATES)) and STATES == WIDE + WIDE_POLES
+assert (range(BODY, WIDE), range(WIDE, WIDE + WIDE_POLES)) == PARTS
 SLOPE = np.zeros(STATES)
 """The slope (times Δ) is this row times the state."""
 SLOPE[[BODY, WIDE]] = 1.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numba
 import numpy as np
 
 from gramoscope.conventions import BoolArray, FloatArray, IntArray
@@ -78,9 +79,19 @@ class PlaceSamples:
         gains : float64 array, shape (2,)
             How far the inner and the outer wall move towards +l when the groove rises by one.
         """
-        row = taylor(self.arc_m / step_m - self.bin)
-        h = np.concatenate([row, row * gains[self.wall][:, None]], axis=1)
+        h = _both_directions(taylor(self.arc_m / step_m - self.bin), gains[self.wall])
         return Readings(self.bin - first_bin, self.wall, h, self.place_m, self.variance, self.gate_variance)
+
+
+@numba.njit(cache=True, nogil=True)
+def _both_directions(row, gain):  # type: ignore[no-untyped-def]
+    """Each row, and beside it the same times a gain."""
+    size = row.shape[1]
+    out = np.empty((row.shape[0], 2 * size))
+    for j in range(row.shape[0]):
+        for i in range(size):
+            out[j, i], out[j, size + i] = row[j, i], row[j, i] * gain[j]
+    return out
 
 
 def samples_of(stretch: Stretch, step_m: float) -> PlaceSamples:

@@ -210,7 +210,9 @@ class _PlaceFollower:
 
 def _both_walls(samples: PlaceSamples, first: int, stop: int) -> BoolArray:
     """Whether both walls were seen within `NEAR` bins of each."""
-    edges = np.arange(first - NEAR, stop + NEAR + 1)
-    both = np.intersect1d(samples.bin[samples.wall == INNER], samples.bin[samples.wall == OUTER])
-    count = np.searchsorted(both, edges)
+    seen = np.zeros((2, stop - first + 2 * NEAR), np.bool_)
+    place = samples.bin - (first - NEAR)
+    here = (place >= 0) & (place < seen.shape[1])
+    seen[samples.wall[here], place[here]] = True
+    count = np.append(0, np.cumsum(seen[INNER] & seen[OUTER]))
     return np.asarray(count[2 * NEAR + 1 :] > count[: -2 * NEAR - 1])

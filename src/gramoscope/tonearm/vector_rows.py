@@ -57,9 +57,11 @@ class Writer:
         )
 
     def load(self, matrix: int, row: int = 0, part: int = 0) -> Value:
+        """A row, or a later one that lies in the same piece."""
         return self.builder.load(self._part(matrix, row, part), align=8)
 
     def store(self, value: Value, matrix: int, row: int = 0, part: int = 0) -> None:
+        """Write a row."""
         self.builder.store(value, self._part(matrix, row, part), align=8)
 
     def spread(self, matrix: int, row: int, column: int) -> Value:
