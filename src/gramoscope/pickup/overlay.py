@@ -91,21 +91,54 @@ def _common(places, run):  # type: ignore[no-untyped-def]
     return (start, stop) if stop - start >= PIXELS else (run[1], run[1])
 
 
+@numba.njit(cache=True, nogil=True, fastmath={"contract"})
+def _add_sums(film, begins, first, stride, taps, start, stop, total):  # type: ignore[no-untyped-def]
+    """Add some frames, added up as whole numbers, to the columns from start to stop of [row, column]."""
+    w0, w1, w2, w3 = np.float32(taps[0]), np.float32(taps[1]), np.float32(taps[2]), np.float32(taps[3])
+    sums, into = np.empty(stop - start + 3, np.uint32), total.reshape(total.size)
+    one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
+    for j in range(total.shape[0]):
+        sums[:] = 0
+        for begin in begins:
+            here = np.uint64(begin + first + j * stride)
+            for x in range(np.uint64(sums.size)):
+                sums[x] += film[here + x]
+        there = np.uint64(j * total.shape[1] + start)
+        for x in range(np.uint64(stop - start)):
+            near = w0 * np.float32(sums[x]) + w1 * np.float32(sums[x + one])
+            into[there + x] += near + w2 * np.float32(sums[x + two]) + w3 * np.float32(sums[x + three])
+
+
 @numba.njit(cache=True, nogil=True)
-def _add_ends(film, shape, places, fraction, rows, run, common, total):  # type: ignore[no-untyped-def]
-    """Write what frames add up to where not all of them reach, each interpolated by itself."""
-    total[:, : common[0] - run[0]] = np.float32(0)
-    total[:, common[1] - run[0] : run[1] - run[0]] = np.float32(0)
-    for i in range(len(places)):
-        k, start, stop, offset = places[i]
-        pixel = k * shape[0] + rows[0] * shape[1] + offset - 1
+def _add_end(film, shape, places, begins, taps, rows, run, end, total):  # type: ignore[no-untyped-def]
+    """Add frames of one fraction of a pixel to an end: whole numbers where all of them reach, each by itself elsewhere."""
+    low, high = end
+    for k in range(len(places)):
+        low, high = max(low, places[k, 1]), min(high, places[k, 2])
+    if high <= low:
+        low = high = end[1]
+    if high > low:
+        _add_sums(film, begins, rows[0] * shape[1] + low, shape[1], taps, low - run[0], high - run[0], total)
+    for k in range(len(places)):
+        pixel = begins[k] + rows[0] * shape[1]
         for first, last in (
-            (max(start, run[0]), min(stop, common[0])),
-            (max(start, common[1]), min(stop, run[1])),
+            (max(places[k, 1], end[0]), min(places[k, 2], low)),
+            (max(places[k, 1], high), min(places[k, 2], end[1])),
         ):
             if last > first:
-                taps = cubic_taps(fraction[i])
                 _add_frame(film, pixel + first, shape[1], taps, first - run[0], last - run[0], total)
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_ends(film, shape, places, begins, phases, taps, rows, run, common, total):  # type: ignore[no-untyped-def]
+    """Write what frames add up to where not all of them reach."""
+    for end in ((run[0], common[0]), (common[1], run[1])):
+        if end[1] > end[0]:
+            total[:, end[0] - run[0] : end[1] - run[0]] = np.float32(0)
+            for p in range(len(phases) - 1):
+                some = slice(phases[p], phases[p + 1])
+                four = taps[4 * p : 4 * p + 4]
+                _add_end(film, shape, places[some], begins[some], four, rows, run, end, total)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -181,7 +214,8 @@ def _overlay(film, shape, places, fraction, share, wanted, columns):  # type: ig
                 common = _common(places, run)
                 if common[1] > common[0]:
                     _add_up(film, shape[1], begins, phases, taps, rows, run, common, lines, total)
-                _add_ends(film, shape, places, fraction, rows, run, common, total[: rows[1] - rows[0]])
+                part = total[: rows[1] - rows[0]]
+                _add_ends(film, shape, places, begins, phases, taps, rows, run, common, part)
                 _write(total, share, run, rows, columns)
             else:
                 tile += 1
