@@ -17,7 +17,7 @@ from gramoscope.pickup.film_lanes import (
     write_energies,
     write_in_tone,
 )
-from gramoscope.pickup.texture.vector_lanes import LANES
+from gramoscope.pickup.lane_writer import LANES
 
 RNG = np.random.default_rng(8)
 WIDTHS = [PIXELS, PIXELS + 1, 3 * PIXELS - 1]

@@ -2,8 +2,8 @@
 
 Pixels are small whole numbers: 64 of them are added at a time, and what frames that lie at one fraction of a pixel add up to
 becomes single precision on its way out of the registers. A picture is drawn row by row and wanted column by column: sixteen
-rows of sixteen columns change places without touching memory, and leave as whole cache lines. As in `texture.vector_lanes`,
-arrays are C-contiguous and given with the place in them where to begin.
+rows of sixteen columns change places without touching memory, and leave as whole cache lines. Arrays are
+given as `lane_writer` says.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 
 from llvmlite import ir
 
-from gramoscope.pickup.texture.vector_lanes import LANES, Value, _compiled, _function, _room, _Writer
+from gramoscope.pickup.lane_writer import INT, LANES, LONG, REAL, LaneWriter, Value, compiled, function, room_for
 
 PIXELS = 64
 """So many pixels are added at a time; a line has at least as many."""
@@ -23,43 +23,41 @@ PRODUCTS = 8
 SERIES = 9
 SQUARE_ROOT_HALF_BITS = 0x3F3504F3
 """√½ in single precision, as a whole number."""
-_LONG, _INT = ir.IntType(64), ir.IntType(32)
-_ANY = ir.Constant(ir.VectorType(ir.FloatType(), LANES), ir.Undefined)
 
 
 def _places(numbers: list[int]) -> Value:
-    return ir.Constant(ir.VectorType(_INT, len(numbers)), numbers)
+    return ir.Constant(ir.VectorType(INT, len(numbers)), numbers)
 
 
-def _least(w: _Writer, one: Value, other: Value) -> Value:
+def _least(w: LaneWriter, one: Value, other: Value) -> Value:
     return w.builder.select(w.builder.icmp_signed("<", one, other), one, other)
 
 
-def _in_pieces(w: _Writer, count: Value, size: int) -> tuple[Value, Any]:
+def _in_pieces(w: LaneWriter, count: Value, size: int) -> tuple[Value, Any]:
     """How many pieces of such a size make up a line, and where each begins: the last one ends where the line does."""
-    pieces = w.builder.sdiv(w.plus(count, size - 1), ir.Constant(_LONG, size))
+    pieces = w.builder.sdiv(w.plus(count, size - 1), ir.Constant(LONG, size))
     last = w.plus(count, -size)
     return pieces, lambda piece: _least(w, w.times(piece, size), last)
 
 
-def _pixels(w: _Writer, film: Value, place: Value, kind: ir.IntType) -> Value:
+def _pixels(w: LaneWriter, film: Value, place: Value, kind: ir.IntType) -> Value:
     """Pixels from a place on, as whole numbers of such a kind."""
     seen = ir.VectorType(film.type.pointee, PIXELS)
     near = w.builder.bitcast(w.builder.gep(film, [place]), seen.as_pointer())
     return w.builder.zext(w.builder.load(near, align=1), ir.VectorType(kind, PIXELS))
 
 
-def _write_real(w: _Writer, numbers: Value, line: Value, place: Value) -> None:
+def _write_real(w: LaneWriter, numbers: Value, line: Value, place: Value) -> None:
     """Write whole numbers as numbers of single precision."""
-    real = w.builder.uitofp(numbers, ir.VectorType(ir.FloatType(), PIXELS))
+    real = w.builder.uitofp(numbers, ir.VectorType(REAL, PIXELS))
     w.builder.store(real, w.builder.bitcast(w.builder.gep(line, [place]), real.type.as_pointer()), align=4)
 
 
-def _sum_of_lines(w: _Writer) -> None:
+def _sum_of_lines(w: LaneWriter) -> None:
     film, begins, first, frames, offset, soon, line, place, count = w.arguments
     kind = ir.IntType(2 * film.type.pointee.width)
     pieces, begin = _in_pieces(w, count, PIXELS)
-    room = _room(w.builder, ir.VectorType(kind, PIXELS))
+    room = room_for(w.builder, ir.VectorType(kind, PIXELS))
 
     def piece(number: Value) -> None:
         x = begin(number)
@@ -78,12 +76,12 @@ def _sum_of_lines(w: _Writer) -> None:
     w.loop(pieces, piece)
 
 
-def _moved(w: _Writer, here: Value, behind: Value, far: int) -> Value:
+def _moved(w: LaneWriter, here: Value, behind: Value, far: int) -> Value:
     """What begins so many numbers after the first of two neighbouring vectors."""
     return w.builder.shuffle_vector(here, behind, _places([far + k for k in range(LANES)])) if far else here
 
 
-def _sum_of_phases(w: _Writer) -> None:
+def _sum_of_phases(w: LaneWriter) -> None:
     lines, step, taps, phases, total, place, count = w.arguments
     at_once = 2
     first = w.sums(at_once)
@@ -107,10 +105,10 @@ def _sum_of_phases(w: _Writer) -> None:
         for k, room in enumerate(first):
             w.store(w.builder.load(room), total, w.plus(w.plus(place, x), k * LANES))
 
-    w.loop(w.builder.sdiv(w.plus(count, at_once * LANES - 1), ir.Constant(_LONG, at_once * LANES)), piece)
+    w.loop(w.builder.sdiv(w.plus(count, at_once * LANES - 1), ir.Constant(LONG, at_once * LANES)), piece)
 
 
-def _turned(w: _Writer, rows: list[Value]) -> list[Value]:
+def _turned(w: LaneWriter, rows: list[Value]) -> list[Value]:
     """Sixteen rows of sixteen columns as columns (J. O. Eklundh, 1972)."""
     far = LANES // 2
     while far:
@@ -124,7 +122,7 @@ def _turned(w: _Writer, rows: list[Value]) -> list[Value]:
     return rows
 
 
-def _means_as_columns(w: _Writer) -> None:
+def _means_as_columns(w: LaneWriter) -> None:
     total, begin, step, share, first, count, columns, place, height = w.arguments
     pieces, start = _in_pieces(w, count, LANES)
 
@@ -139,31 +137,31 @@ def _means_as_columns(w: _Writer) -> None:
     w.loop(pieces, piece)
 
 
-@_compiled
+@compiled
 def sum_lines(_, film, begins, first, frames, offset, soon, line, place, count):  # type: ignore[no-untyped-def]
     """Write sums of so many lines of a film, which begin `offset` after the places given, as single precision.
 
     At least `PIXELS` of them; those `soon` places further on are called for.
     """
-    return _function((film, begins, first, frames, offset, soon, line, place, count), _sum_of_lines)
+    return function((film, begins, first, frames, offset, soon, line, place, count), _sum_of_lines)
 
 
-@_compiled
+@compiled
 def sum_phases(_, lines, step, taps, phases, total, place, count):  # type: ignore[no-untyped-def]
     """Write sums of lines, `step` apart, each interpolated by four taps of its own.
 
     Up to 31 numbers more than are asked for are written, and 16 more of each line are read.
     """
-    return _function((lines, step, taps, phases, total, place, count), _sum_of_phases)
+    return function((lines, step, taps, phases, total, place, count), _sum_of_phases)
 
 
-@_compiled
+@compiled
 def write_as_columns(_, total, begin, step, share, first, count, columns, place, height):  # type: ignore[no-untyped-def]
     """Write sixteen rows, `step` apart, as at least sixteen columns, `height` apart, each times its share."""
-    return _function((total, begin, step, share, first, count, columns, place, height), _means_as_columns)
+    return function((total, begin, step, share, first, count, columns, place, height), _means_as_columns)
 
 
-def _summed(w: _Writer, rows: list[Value]) -> list[Value]:
+def _summed(w: LaneWriter, rows: list[Value]) -> list[Value]:
     """Sums of the first and of the last eight numbers of sixteen vectors, as two vectors.
 
     Two vectors become one, three times over: the fourth number further on is added, then neighbours, then theirs.
@@ -188,7 +186,7 @@ def _summed(w: _Writer, rows: list[Value]) -> list[Value]:
     ]
 
 
-def _energies_of_cells(w: _Writer) -> None:
+def _energies_of_cells(w: LaneWriter) -> None:
     lines, begin, step, weight, cells, energy, place, height = w.arguments
     pieces, start = _in_pieces(w, cells, 2)
     half = w.constant(0.5)
@@ -212,22 +210,22 @@ def _energies_of_cells(w: _Writer) -> None:
     w.loop(pieces, piece)
 
 
-@_compiled
+@compiled
 def write_energies(_, lines, begin, step, weight, cells, energy, place, height):  # type: ignore[no-untyped-def]
     """Write the energies of at least two cells of eight columns, `height` apart, for sixteen rows, `step` apart.
 
     Energies are the squares of slopes by the derivative of a Gaussian of about one pixel, from four columns: what is two
     before and two behind a row is read, too. Each slope is given its column's weight.
     """
-    return _function((lines, begin, step, weight, cells, energy, place, height), _energies_of_cells)
+    return function((lines, begin, step, weight, cells, energy, place, height), _energies_of_cells)
 
 
-def _products_of_rows(w: _Writer) -> None:
+def _products_of_rows(w: LaneWriter) -> None:
     film, here, there, count, sums = w.arguments
     b, bits = w.builder, film.type.pointee.width
     small, wide = (ir.VectorType(ir.IntType(size * bits), COLUMNS) for size in (2, 4))
     pieces, start = _in_pieces(w, count, COLUMNS)
-    rooms = [_room(b, wide) for _ in range(PRODUCTS)]
+    rooms = [room_for(b, wide) for _ in range(PRODUCTS)]
     zero, order = ir.Constant(small, [0] * COLUMNS), ir.Constant(small, [*range(COLUMNS)])
     for room in rooms:
         b.store(ir.Constant(wide, [0] * COLUMNS), room)
@@ -242,7 +240,7 @@ def _products_of_rows(w: _Writer) -> None:
         slope = b.sub(b.add(seen(mine, 2), seen(mine, 1)), b.add(seen(mine, -1), seen(mine, -2)))
         # the last piece shows some columns again
         nothing, again = ir.Constant(small, ir.Undefined), b.sub(w.times(number, COLUMNS), x)
-        again = b.insert_element(nothing, b.trunc(again, small.element), ir.Constant(_INT, 0))
+        again = b.insert_element(nothing, b.trunc(again, small.element), ir.Constant(INT, 0))
         again = b.shuffle_vector(again, nothing, _places([0] * COLUMNS))
         slope = b.select(b.icmp_signed("<", order, again), zero, slope)
         for room, factor in zip(rooms, [slope, seen(mine, 0), *(seen(other, k - 2) for k in range(6))], strict=True):
@@ -253,23 +251,23 @@ def _products_of_rows(w: _Writer) -> None:
     kind = ir.FunctionType(wide.element, [wide])
     total = b.module.declare_intrinsic(f"llvm.vector.reduce.add.v{COLUMNS}i{4 * bits}", fnty=kind)
     for k, room in enumerate(rooms):
-        at = b.gep(sums, [ir.Constant(_LONG, k)])
+        at = b.gep(sums, [ir.Constant(LONG, k)])
         sum_ = b.call(total, [b.load(room)])
-        b.store(b.add(b.load(at), sum_ if sum_.type == _LONG else b.sext(sum_, _LONG)), at)
+        b.store(b.add(b.load(at), sum_ if sum_.type == LONG else b.sext(sum_, LONG)), at)
 
 
-@_compiled
+@compiled
 def add_products(_, film, here, there, count, sums):  # type: ignore[no-untyped-def]
     """Add, to eight sums, the products of a row's slope with itself, with its row and with six places of another row.
 
     The slope is x₂ + x₁ − x₋₁ − x₋₂, the places are −2 … 3, and there are at least `COLUMNS` columns.
     """
-    return _function((film, here, there, count, sums), _products_of_rows)
+    return function((film, here, there, count, sums), _products_of_rows)
 
 
-def _logarithms(w: _Writer, number: Value, series: list[Value], gain: Value) -> Value:
+def _logarithms(w: LaneWriter, number: Value, series: list[Value], gain: Value) -> Value:
     """Logarithms of positive numbers times a gain: by powers of two, and a series between √½ and √2."""
-    b, whole = w.builder, ir.VectorType(_INT, LANES)
+    b, whole = w.builder, ir.VectorType(INT, LANES)
     bits = b.bitcast(number, whole)
     shift = ir.Constant(whole, [23] * LANES)
     power = b.ashr(b.sub(bits, ir.Constant(whole, [SQUARE_ROOT_HALF_BITS] * LANES)), shift)
@@ -281,11 +279,11 @@ def _logarithms(w: _Writer, number: Value, series: list[Value], gain: Value) -> 
     return b.fmul(gain, twos)
 
 
-def _in_tone(w: _Writer) -> None:
+def _in_tone(w: LaneWriter) -> None:
     grey, count, curve, series, seen = w.arguments
     b, at_once = w.builder, PIXELS // LANES
-    share, rest, gain = (w.spread(curve, ir.Constant(_LONG, k)) for k in range(3))
-    weight = [w.spread(series, ir.Constant(_LONG, k)) for k in range(SERIES)]
+    share, rest, gain = (w.spread(curve, ir.Constant(LONG, k)) for k in range(3))
+    weight = [w.spread(series, ir.Constant(LONG, k)) for k in range(SERIES)]
     zero = w.constant(0.0)
     black = _logarithms(w, rest, weight, gain)
     pieces, start = _in_pieces(w, count, PIXELS)
@@ -308,16 +306,16 @@ def _in_tone(w: _Writer) -> None:
     w.loop(pieces, piece)
 
 
-@_compiled
+@compiled
 def write_in_tone(_, grey, count, curve, series, seen):  # type: ignore[no-untyped-def]
     """Write c log(b + a x) of at least `PIXELS` grey levels x, or 0 if they are below it, for a curve (a, b, c).
 
     Of `SERIES` coefficients of log(1 + y)/y between √½ and √2, the lowest power first. What is black is told at a glance.
     """
-    return _function((grey, count, curve, series, seen), _in_tone)
+    return function((grey, count, curve, series, seen), _in_tone)
 
 
-def _sum_of_real_lines(w: _Writer) -> None:
+def _sum_of_real_lines(w: LaneWriter) -> None:
     first_line, from_, lines, begins, first, number, step, out, place, count = w.arguments
     b, at_once = w.builder, PIXELS // LANES
     rooms = w.sums(at_once)
@@ -336,14 +334,14 @@ def _sum_of_real_lines(w: _Writer) -> None:
         for k, room in enumerate(rooms):
             w.store(b.load(room), out, w.plus(w.plus(place, x), k * LANES))
 
-    w.loop(b.sdiv(w.plus(count, PIXELS - 1), ir.Constant(_LONG, PIXELS)), piece)
+    w.loop(b.sdiv(w.plus(count, PIXELS - 1), ir.Constant(LONG, PIXELS)), piece)
 
 
-@_compiled
+@compiled
 def add_lines(_, first_line, from_, lines, begins, first, number, step, out, place, count):  # type: ignore[no-untyped-def]
     """Write a line to which others are added, in their order: those that begin at every `step`-th of the places given.
 
     Up to 63 numbers more than are asked for are read and written.
     """
     arguments = (first_line, from_, lines, begins, first, number, step, out, place, count)
-    return _function(arguments, _sum_of_real_lines)
+    return function(arguments, _sum_of_real_lines)

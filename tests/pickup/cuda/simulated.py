@@ -13,6 +13,7 @@ from gramoscope.pickup.cuda import film_kernels
 from gramoscope.pickup.cuda.ear_there import ear_there
 from gramoscope.pickup.cuda.graphics_card import GraphicsCard, drawn
 from gramoscope.pickup.device import Film
+from gramoscope.pickup.lane_writer import LANES
 from gramoscope.pickup.overlay import TILE_COLUMNS, TILE_ROWS, overlay_width
 from gramoscope.pickup.processor import PROCESSOR
 from gramoscope.pickup.texture.filter_bank import FilterBank
@@ -24,7 +25,6 @@ from gramoscope.pickup.texture.reading import Model, Rules, read
 from gramoscope.pickup.texture.spectrum import Band, filtered
 from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.pickup.texture.tone import Tone
-from gramoscope.pickup.texture.vector_lanes import LANES
 from gramoscope.pickup.texture_likelihood import samples_of
 from gramoscope.signal_path import FrameGroup
 

@@ -6,8 +6,8 @@ from scipy import fft
 
 from gramoscope.conventions import Float32Array
 from gramoscope.errors import ArgumentError
+from gramoscope.pickup.lane_writer import LANES
 from gramoscope.pickup.texture.lane_transform import PAIR, fast_length, fold, let_through, plan_for, transform
-from gramoscope.pickup.texture.vector_lanes import LANES
 
 LENGTHS = [2, 4, 6, 8, 10, 12, 30, 90, 96, 250, 486, 1458, 1500, 1536]
 EXACT = 1e-5

@@ -3,7 +3,8 @@
 import numba
 import numpy as np
 
-from gramoscope.pickup.texture.vector_lanes import AT_ONCE, LANES, filter_symmetrically, interpolate, mix, power
+from gramoscope.pickup.lane_writer import LANES
+from gramoscope.pickup.texture.vector_lanes import AT_ONCE, filter_symmetrically, interpolate, mix, power
 
 RNG = np.random.default_rng(5)
 

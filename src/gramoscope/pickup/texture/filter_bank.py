@@ -26,9 +26,9 @@ import numpy as np
 from scipy import fft
 
 from gramoscope.conventions import Float32Array, FloatArray
+from gramoscope.pickup.lane_writer import LANES
 from gramoscope.pickup.texture.following import GENTLE, across, shifted
 from gramoscope.pickup.texture.spectrum import Band
-from gramoscope.pickup.texture.vector_lanes import LANES
 
 LEAST_POWER = 1e-6
 """Of the loudest direction: what is weaker in a covariance is taken to be that strong."""

@@ -14,7 +14,8 @@ import numba
 import numpy as np
 
 from gramoscope.conventions import Float32Array, FloatArray, IntArray
-from gramoscope.pickup.texture.vector_lanes import LANES, interpolate
+from gramoscope.pickup.lane_writer import LANES
+from gramoscope.pickup.texture.vector_lanes import interpolate
 
 TAPS = 10
 PHASES = 512

@@ -15,6 +15,7 @@ import numba
 import numpy as np
 
 from gramoscope.conventions import INNER, OUTER, BoolArray, Float32Array, FloatArray, IntArray
+from gramoscope.pickup.lane_writer import LANES
 from gramoscope.pickup.texture.following import REACH, STEPS, step_mixtures, step_of, wide_rows
 from gramoscope.pickup.texture.lane_transform import PAIR, fold, let_through, plan_for, transform
 from gramoscope.pickup.texture.layout import StripeLayout, see_stripe
@@ -29,7 +30,7 @@ from gramoscope.pickup.texture.likelihood import (
     within,
 )
 from gramoscope.pickup.texture.spectrum import Band, half_of
-from gramoscope.pickup.texture.vector_lanes import AT_ONCE, LANES, filter_symmetrically, mix
+from gramoscope.pickup.texture.vector_lanes import AT_ONCE, filter_symmetrically, mix
 from gramoscope.pickup.texture.vector_lanes import power as usual_power
 
 if TYPE_CHECKING:

@@ -23,7 +23,8 @@ from scipy import fft
 
 from gramoscope.conventions import Float32Array, IntArray
 from gramoscope.errors import require
-from gramoscope.pickup.texture.vector_lanes import LANES, fifths, fold_bin, halves, quarters, thirds, weigh_bin
+from gramoscope.pickup.lane_writer import LANES
+from gramoscope.pickup.texture.vector_lanes import fifths, fold_bin, halves, quarters, thirds, weigh_bin
 
 PAIR = 2 * LANES
 """Numbers in a complex lane."""

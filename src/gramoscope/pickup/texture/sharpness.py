@@ -16,8 +16,8 @@ import numpy as np
 from gramoscope.camera.film_line import film_line
 from gramoscope.conventions import Float32Array, FloatArray, IntArray
 from gramoscope.pickup.film_lanes import PIXELS, sum_lines, write_energies
+from gramoscope.pickup.lane_writer import LANES
 from gramoscope.pickup.overlay import overlay_width
-from gramoscope.pickup.texture.vector_lanes import LANES
 from gramoscope.quantile import quantile
 from gramoscope.signal_path import ImageArray
 

@@ -17,6 +17,7 @@ import numpy as np
 from gramoscope.conventions import BoolArray, FloatArray, IntArray
 from gramoscope.errors import require
 from gramoscope.pickup.cartridge import Spread
+from gramoscope.pickup.lane_writer import LANES
 from gramoscope.pickup.texture.filter_bank import (
     FilterBank,
     common_channels,
@@ -42,7 +43,6 @@ from gramoscope.pickup.texture.likelihood import (
 from gramoscope.pickup.texture.reading import Model, Rules
 from gramoscope.pickup.texture.spectrum import CrossSpectra, LagSums, precision
 from gramoscope.pickup.texture.stretch import Stretch
-from gramoscope.pickup.texture.vector_lanes import LANES
 
 LEAST_WEIGHT = 100.0
 """Columns of a stretch; with fewer it teaches nothing."""
