@@ -24,6 +24,7 @@ LEAST_SEEN = 0.2
 """A wall that shows less of a stretch is not believed there."""
 REACH = 3
 """So many neighbours on each side take part in a median."""
+_NOT_MEASURED, _INTERPOLATED, _SPARSE = (np.uint16(one) for one in (NOT_MEASURED, Quality.INTERPOLATED, Quality.SPARSE))
 HAMPEL_GATE = 3.0
 """A sample further from the median than so many times its error and the neighbours' median deviation is an outlier."""
 
@@ -67,11 +68,9 @@ def stretch_of(trace: WallTrace) -> Stretch:
 
     So is a wall of which hardly anything was seen in the whole stretch: what was seen is a guess.
     """
-    flagged = (trace.flags & np.uint16(NOT_MEASURED)) != 0
-    seen = np.isfinite(trace.offset_m) & (trace.offset_sigma_m > 0) & np.isfinite(trace.offset_sigma_m) & ~flagged
-    sparse = seen & (seen.mean(axis=1, keepdims=True) < LEAST_SEEN)
-    seen &= ~sparse
-    place, variance = np.where(seen, trace.offset_m, np.nan), np.where(seen, trace.offset_sigma_m**2, np.nan)
+    place, variance = np.empty(trace.flags.shape), np.empty(trace.flags.shape)
+    flags = trace.flags.copy()
+    _measured(trace.offset_m, trace.offset_sigma_m, place, variance, flags)
     middle = running_median(place)
     return Stretch(
         arc_m=trace.arc_start_m + np.arange(trace.flags.shape[1], dtype=np.float64) * trace.arc_step_m,
@@ -80,12 +79,32 @@ def stretch_of(trace: WallTrace) -> Stretch:
         middle_m=middle,
         suspect=suspects(place, variance, middle),
         share=np.ones(trace.flags.shape),
-        flags=(trace.flags | np.where(seen, 0, Quality.INTERPOLATED) | np.where(sparse, Quality.SPARSE, 0)).astype(
-            np.uint16
-        ),
+        flags=flags,
         step_m=trace.arc_step_m,
         correlation_samples=trace.correlation_samples,
     )
+
+
+@numba.njit(cache=True, nogil=True)
+def _measured(offset_m, sigma_m, place_m, variance, flags):  # type: ignore[no-untyped-def]
+    """Write what was measured of each wall, NaN elsewhere, and flag what was not."""
+    walls, size = flags.shape
+    for wall in range(walls):
+        known = 0
+        for i in range(size):
+            sigma, offset = sigma_m[wall, i], offset_m[wall, i]
+            seen = np.isfinite(offset) and 0 < sigma < np.inf and not flags[wall, i] & _NOT_MEASURED
+            place_m[wall, i] = offset if seen else np.nan
+            known += seen
+        sparse = known < LEAST_SEEN * size
+        for i in range(size):
+            seen = not np.isnan(place_m[wall, i])
+            if seen and sparse:
+                flags[wall, i] |= _SPARSE
+                place_m[wall, i] = np.nan
+            if not seen or sparse:
+                flags[wall, i] |= _INTERPOLATED
+            variance[wall, i] = np.nan if not seen or sparse else sigma_m[wall, i] ** 2
 
 
 def handed_over(stretches: Iterable[Stretch]) -> Iterator[Stretch]:
@@ -171,12 +190,21 @@ def suspects(place_m: FloatArray, variance: FloatArray, middle_m: FloatArray) ->
     it takes for a sharp bend of one wall it is allowed to lose.
     """
     middle, spread = _neighbours(place_m, middle_m)
-    away = place_m - middle
-    with np.errstate(invalid="ignore"):
-        wild = np.abs(away) > HAMPEL_GATE * (np.sqrt(variance) + spread)
-        apart = np.minimum(np.abs(away[INNER] - away[OUTER]), np.abs(away[INNER] + away[OUTER]))
-        together = apart < HAMPEL_GATE * np.sqrt(variance.sum(axis=0))
-    return np.asarray(wild & ~together)
+    wild = np.empty(place_m.shape, np.bool_)
+    _disagree(place_m - middle, spread, variance, wild)
+    return wild
+
+
+@numba.njit(cache=True, nogil=True)
+def _disagree(away, spread, variance, wild):  # type: ignore[no-untyped-def]
+    """Tell which samples are wild, and not together with the other wall's."""
+    for i in range(away.shape[1]):
+        inner, outer = away[INNER, i], away[OUTER, i]
+        apart = min(abs(inner - outer), abs(inner + outer))
+        together = apart < HAMPEL_GATE * np.sqrt(variance[INNER, i] + variance[OUTER, i])
+        for wall in range(len(away)):
+            known = np.sqrt(variance[wall, i]) + spread[wall, i]
+            wild[wall, i] = abs(away[wall, i]) > HAMPEL_GATE * known and not together
 
 
 def _hand_over(before: Stretch, after: Stretch) -> tuple[Stretch, Stretch]:
@@ -189,7 +217,17 @@ def _hand_over(before: Stretch, after: Stretch) -> tuple[Stretch, Stretch]:
 
 def _faded(stretch: Stretch, fade: FloatArray, other: Stretch) -> Stretch:
     """The stretch with its share lowered wherever the other saw the same wall."""
-    nearest = np.rint((stretch.arc_m - other.arc_m[0]) / stretch.step_m).astype(np.int64)
-    there = (nearest >= 0) & (nearest < other.arc_m.size)
-    seen = np.isfinite(other.place_m[:, np.clip(nearest, 0, other.arc_m.size - 1)]) & there
-    return replace(stretch, share=np.where(seen, stretch.share * np.clip(fade, 0.0, 1.0), stretch.share))
+    share = stretch.share.copy()
+    _lower(share, fade, stretch.arc_m, stretch.step_m, other.arc_m[0], other.place_m)
+    return replace(stretch, share=share)
+
+
+@numba.njit(cache=True, nogil=True)
+def _lower(share, fade, arc_m, step_m, other_start_m, other_place_m):  # type: ignore[no-untyped-def]
+    """Lower the share of each sample by a fade, where the other stretch saw the same wall."""
+    for i in range(arc_m.size):
+        nearest = int(np.rint((arc_m[i] - other_start_m) / step_m))
+        if 0 <= nearest < other_place_m.shape[1]:
+            for wall in range(len(share)):
+                if np.isfinite(other_place_m[wall, nearest]):
+                    share[wall, i] *= min(max(fade[i], 0.0), 1.0)
