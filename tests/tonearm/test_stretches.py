@@ -62,7 +62,7 @@ def _trace(seed: int, start_m: float, *, seen: float = 1.0) -> WallTrace:
     rng, place = np.random.default_rng(seed), _places(seed)
     place[1, round(60 * seen) :] = np.nan
     sigma = rng.choice([4e-8, np.nan, 0.0, np.inf], place.shape, p=[0.85, 0.05, 0.05, 0.05])
-    flags = rng.choice([0, Quality.SATURATED, Quality.NO_STRIPE], place.shape, p=[0.8, 0.1, 0.1]).astype(np.uint16)
+    flags = rng.choice([0, Quality.SATURATED, Quality.INTERPOLATED], place.shape, p=[0.8, 0.1, 0.1]).astype(np.uint16)
     nothing = np.full(place.shape, np.nan)
     return WallTrace(
         number=seed,
