@@ -18,6 +18,7 @@ from gramoscope.camera.film_line import film_line
 from gramoscope.conventions import BoolArray, Float32Array, FloatArray, IntArray
 from gramoscope.pickup.device import Kept
 from gramoscope.pickup.film_lanes import PIXELS, sum_lines, sum_phases, write_as_columns
+from gramoscope.pickup.picture_room import picture_room
 from gramoscope.pickup.registration import cubic_taps, placement
 from gramoscope.signal_path import ImageArray
 
@@ -288,7 +289,7 @@ def overlay(
     height, width = images.shape[1:]
     canvas_width = overlay_width(width, shift_px)
     counts = frames_in(width, shift_px)
-    columns = _picture(canvas_width, height)
+    columns = picture_room(canvas_width, height)
     tiles = all_tiles((height, canvas_width)) if wanted is None else wanted
     share = (1 / np.maximum(counts, 1)).astype(np.float32)
     film, step = film_line(images)
@@ -299,17 +300,6 @@ def overlay(
         columns[: covered[0]] = columns[covered[0]]
         columns[covered[-1] + 1 :] = columns[covered[-1]]
     return Overlay(columns, counts, shift_px, frame_index)
-
-
-def _picture(width: int, height: int) -> Float32Array:
-    """Return room for a picture, [column, row], that begins at a cache line."""
-    room = np.empty(width * height + LINE, np.float32)
-    begin = -room.ctypes.data // room.itemsize % LINE
-    return room[begin : begin + width * height].reshape(width, height)
-
-
-LINE = 16
-"""Numbers of single precision in a cache line."""
 
 
 def _by_fraction(shift_px: FloatArray, width: int, canvas_width: int) -> tuple[IntArray, FloatArray]:

@@ -17,6 +17,7 @@ from numpy.polynomial import Chebyshev, Polynomial
 from gramoscope.conventions import Float32Array, FloatArray
 from gramoscope.errors import require
 from gramoscope.pickup.film_lanes import PIXELS, SERIES, write_in_tone
+from gramoscope.pickup.picture_room import picture_room
 
 LEAST_COMPRESSION = 0.01
 """Weaker ones would be lost in single precision."""
@@ -46,10 +47,9 @@ class Tone:
         """Return how grey levels are seen, float32 array of the same shape; levels below 0 count as 0."""
         if self.compression == 0:
             return grey
-        line = np.ascontiguousarray(grey).reshape(-1)
-        seen = np.empty_like(line)
-        _compress(line, self.level, self.compression, seen)
-        return seen.reshape(grey.shape)
+        seen = picture_room(len(grey), grey[:1].size).reshape(grey.shape)
+        _compress(np.ascontiguousarray(grey).reshape(-1), self.level, self.compression, seen.reshape(-1))
+        return seen
 
 
 def _series() -> Float32Array:
