@@ -27,7 +27,8 @@ from gramoscope.camera.exposure import EVERY_ROW
 from gramoscope.disc.formats import direction_of_cut
 from gramoscope.pickup.device import Device
 from gramoscope.pickup.texture.reading import read
-from gramoscope.pickup.texture_likelihood import TexturePickup, samples_of, sight_of
+from gramoscope.pickup.texture.samples import samples_of
+from gramoscope.pickup.texture_likelihood import TexturePickup, sight_of
 from gramoscope.player.devices import DEVICES, device_named
 from gramoscope.player.film import learned
 from gramoscope.player.recipe import load_recipe

@@ -15,14 +15,13 @@ from gramoscope.pickup.overlay import TILE_COLUMNS, TILE_ROWS
 from gramoscope.pickup.processor import PROCESSOR
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.reading import Evidence, Rules
+from gramoscope.pickup.texture.samples import STRIDE_PX, samples_of
 from gramoscope.pickup.texture.sharpness import sharpness
 from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.pickup.texture_likelihood import (
-    STRIDE_PX,
     Sight,
     TextureLikelihood,
     TexturePickup,
-    samples_of,
     sight_of,
     tiles_to_draw,
     worth_reading,

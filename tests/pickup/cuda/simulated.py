@@ -22,10 +22,10 @@ from gramoscope.pickup.texture.hearing import Ear
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.likelihood import TEXTURE_PX, StripeStatistics
 from gramoscope.pickup.texture.reading import Model, Rules, read
+from gramoscope.pickup.texture.samples import samples_of
 from gramoscope.pickup.texture.spectrum import Band, filtered
 from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.pickup.texture.tone import Tone
-from gramoscope.pickup.texture_likelihood import samples_of
 from gramoscope.signal_path import FrameGroup
 
 CARD = GraphicsCard("simulated")

@@ -80,7 +80,7 @@ def test_the_order_in_which_stretches_are_looked_at_does_not_matter() -> None:
 
 
 def test_pictures_that_show_nothing_leave_the_layout_as_the_manifest_has_it() -> None:
-    blank = [np.random.default_rng(1).normal(100, 1, (WIDTH, HEIGHT)).astype(np.float32)] * 3
+    blank = [np.random.default_rng(1).normal(100, 1, (WIDTH, HEIGHT)).round().astype(np.uint8)] * 3
     found, _ = aligned_layout(_sharp(blank), _layout(), GrooveSearch(), "lateral", map)
     np.testing.assert_array_equal(found.rest_row, _layout().rest_row)
 

@@ -13,7 +13,7 @@ from gramoscope.conventions import FloatArray
 from gramoscope.errors import ArgumentError
 from gramoscope.pickup.texture import stripe_learning
 from gramoscope.pickup.texture.filter_bank import witness_forms
-from gramoscope.pickup.texture.following import REACH
+from gramoscope.pickup.texture.following import REACH, stepped
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.likelihood import StripeStatistics
 from gramoscope.pickup.texture.reading import Model, Rules, evidence
@@ -47,9 +47,20 @@ def material(true: list[Stretch], layout: StripeLayout) -> StripeMaterial:
 
 @pytest.fixture(scope="module")
 def known(material: StripeMaterial) -> list[StripeStatistics]:
+    return _taught(material)
+
+
+def _taught(material: StripeMaterial) -> list[StripeStatistics]:
     learned = [one for one in SHORT.learn(material, None, 0.003) if one is not None]
     assert len(learned) == FOLDS + 1
     return learned
+
+
+def _in_steps(stretch: Stretch, layout: StripeLayout, number: int = 1) -> Stretch:
+    """The same stretch, a stripe of it where reading follows it: what is said is then not told from a place beside it."""
+    rows = layout.rest_row[number] + stretch.displacement_px
+    stepped(rows, np.empty_like(rows))
+    return replace(stretch, displacement_px=rows - layout.rest_row[number])
 
 
 def test_every_fold_is_left_out_once_and_nothing_of_the_whole(material: StripeMaterial, true: list[Stretch]) -> None:
@@ -115,15 +126,18 @@ def _evidence(stretches: list[Stretch], material: StripeMaterial, known: list[St
 
 
 def test_scores_are_zero_on_average_and_answer_to_a_moved_path_as_they_claim(
-    material: StripeMaterial, known: list[StripeStatistics]
+    true: list[Stretch], layout: StripeLayout
 ) -> None:
     move_px = 0.1
+    material = _material([_in_steps(one, layout) for one in true], layout)
+    known = _taught(material)
     asked = []
     for side in (-move_px, 0.0, move_px):
         moved = [one.moved(np.full((2, 1), side)) for one in material.stretches]
         score, information = np.sum(_evidence(moved, material, known), axis=(0, 2))
         asked.append(score / information)
-    assert asked[1] == pytest.approx(0, abs=1e-6 * move_px)
+    # reading mixes what learning does in two steps by one matrix of single precision, which rounds otherwise
+    assert asked[1] == pytest.approx(0, abs=5e-6 * move_px)
     assert asked[0] - asked[2] == pytest.approx(2 * move_px, rel=0.02)
 
 
