@@ -2,8 +2,8 @@
 
 Pixels are small whole numbers: 64 of them are added at a time, and what frames that lie at one fraction of a pixel add up to
 becomes single precision on its way out of the registers. A picture is drawn row by row and wanted column by column: sixteen
-rows of sixteen columns change places without touching memory, and leave as whole cache lines. Arrays are
-given as `lane_writer` says.
+rows of sixteen columns change places without touching memory, and leave as whole cache lines. Arrays are given as `lane_writer`
+says.
 """
 
 from __future__ import annotations
