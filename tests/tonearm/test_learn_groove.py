@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from gramoscope.tonearm.learn_groove import Lesson, PriorLimits, learn, lessons
+from gramoscope.tonearm.groove_prior import BEND_M
+from gramoscope.tonearm.learn_groove import PriorLimits, learn, lessons
 from gramoscope.tonearm.level import OneDirection, bend_power
 
 STEP_M = 3.125e-6
 SIGMA_M = 4e-8
 SPEED_M_S = 0.94
+LAG = round(BEND_M / STEP_M)
 
 
 def _per_m(*hz: float) -> Any:
@@ -28,7 +30,7 @@ def _seen(place_m: np.ndarray) -> OneDirection:
 def test_blocks_are_means_with_smaller_errors_and_only_whole_ones_count() -> None:
     place = np.arange(80.0) ** 2 * 1e-9
     place[31] = np.nan
-    given = lessons([Lesson(_seen(place), 1.0, correlation_samples=2.0)], STEP_M, block=3)
+    given = lessons(_seen(place[None]), np.ones(1), np.full(1, 2.0), STEP_M, block=3)
     assert given is not None
     assert given.step_m == 3 * STEP_M
     # 26 whole blocks, two samples left over, and one block has a hole
@@ -42,10 +44,10 @@ def test_blocks_are_means_with_smaller_errors_and_only_whole_ones_count() -> Non
 
 
 def test_a_stretch_of_which_hardly_a_block_is_whole_teaches_nothing() -> None:
-    place = np.zeros(100)
-    place[::3] = np.nan
-    assert lessons([Lesson(_seen(place), 1.0)], STEP_M, block=1) is not None
-    assert lessons([Lesson(_seen(place), 1.0)], STEP_M, block=3) is None
+    place = np.zeros((1, 100))
+    place[:, ::3] = np.nan
+    assert lessons(_seen(place), np.ones(1), np.ones(1), STEP_M, block=1) is not None
+    assert lessons(_seen(place), np.ones(1), np.ones(1), STEP_M, block=3) is None
     assert learn(None, LIMITS) == LIMITS.middle
 
 
@@ -53,9 +55,10 @@ def test_means_teach_the_same_spectrum(bench: Any) -> None:
     spectrum = lambda f: np.hypot(1 / (1 + (f / 900) ** 2), 0.03 / (1 + (f / 12_000) ** 3))  # noqa: E731
     course, rng = bench.course(spectrum, 0.03, groups=64, seed=3), np.random.default_rng(4)
     arc = (np.arange(64) * bench.group_step)[:, None] * STEP_M + np.arange(160) * STEP_M
-    seen = [_seen(course.place(one) + SIGMA_M * rng.normal(size=one.size)) for one in arc]
-    heard = [Lesson(one, np.sqrt(max(bend_power(one, STEP_M), 0.0))) for one in seen]
-    priors = [learn(lessons(heard, STEP_M, block=block), LIMITS) for block in (1, 3)]
+    seen = _seen(course.place(arc) + SIGMA_M * rng.normal(size=arc.shape))
+    power = np.array([bend_power(*both, LAG) for both in zip(seen.place_m, seen.variance, strict=True)])
+    level = np.sqrt(np.maximum(power, 0.0)) / (LAG * STEP_M)
+    priors = [learn(lessons(seen, level, np.ones(64), STEP_M, block=block), LIMITS) for block in (1, 3)]
     k = 2 * np.pi * np.array([500.0, 1000, 2000, 4000, 8000, 14_000]) / SPEED_M_S
     one, other = (prior.share**2 * prior.slope_density(k) / prior.bend(STEP_M) ** 2 for prior in priors)
     assert np.max(np.abs(10 * np.log10(other / one))) < 1.5

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from gramoscope.tonearm import level
-from gramoscope.tonearm.level import EIGHTH_DIFFERENCE, ENOUGH, Walls, claim_error
+from gramoscope.tonearm.level import EIGHTH_DIFFERENCE, ENOUGH, claim_error
 
 SIGMA_M = 5e-8
 SAMPLES = 165
 
 
-def _walls(errors: np.ndarray) -> list[Walls]:
+def _walls(errors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Of errors in units of what is claimed, shape (stretch, 2, sample)."""
-    return [Walls(SIGMA_M * one, np.full(one.shape, SIGMA_M**2)) for one in errors]
+    return SIGMA_M * errors, np.full(errors.shape, SIGMA_M**2)
 
 
 def _moving_average(weights: np.ndarray, rng: np.random.Generator, stretches: int) -> np.ndarray:
@@ -28,7 +28,7 @@ def _moving_average(weights: np.ndarray, rng: np.random.Generator, stretches: in
 @pytest.mark.parametrize("times", [0.8, 1.0, 1.6])
 def test_white_errors_are_so_many_times_what_they_claim(times: float, longest: int) -> None:
     errors = np.random.default_rng(1).normal(size=(200, 2, SAMPLES))
-    assert claim_error(_walls(times * errors), longest) == pytest.approx(times, rel=0.03)
+    assert claim_error(*_walls(times * errors), longest) == pytest.approx(times, rel=0.03)
 
 
 @pytest.mark.parametrize("block", [1, 2, 3])
@@ -38,13 +38,13 @@ def test_errors_that_neighbours_share_are_those_of_blocks(block: int) -> None:
     weight = np.repeat(EIGHTH_DIFFERENCE, block)
     expected = np.sqrt(np.sum(np.convolve(weight, shared) ** 2) / np.sum(weight**2))
     errors = _moving_average(shared, np.random.default_rng(2), 400)
-    assert claim_error(_walls(errors), block) == pytest.approx(expected, rel=0.03)
+    assert claim_error(*_walls(errors), block) == pytest.approx(expected, rel=0.03)
 
 
 def test_longer_blocks_hear_more_of_them() -> None:
     shared = np.array([1.0, 0.1]) / np.hypot(1.0, 0.1)
     errors = _moving_average(shared, np.random.default_rng(3), 400)
-    single, blocks = (claim_error(_walls(errors), longest) for longest in (1, 5))
+    single, blocks = (claim_error(*_walls(errors), longest) for longest in (1, 5))
     assert single < 0.93
     # what is far slower than the errors' own memory has to bear 1.1 times as much
     assert blocks == pytest.approx(1.1 / np.hypot(1.0, 0.1), abs=0.05)
@@ -59,9 +59,9 @@ def test_sound_is_no_error(bench: Any, times_faster: float, longest: int, monkey
     place = course.place(starts + times_faster * bench.step_m * np.arange(SAMPLES))
     walls = _walls(place[:, np.newaxis] / SIGMA_M + rng.normal(size=(200, 2, SAMPLES)))
     # what sound a block of one sample more hears is seen only if it is more than this
-    assert 0.95 < claim_error(walls, longest) < 1.02 * level.SOUND_GROWS
+    assert 0.95 < claim_error(*walls, longest) < 1.02 * level.SOUND_GROWS
     monkeypatch.setattr(level, "SOUND_GROWS", np.inf)
-    assert claim_error(walls, longest) > 1.8
+    assert claim_error(*walls, longest) > 1.8
 
 
 def test_outliers_and_holes_are_not_seen() -> None:
@@ -69,18 +69,18 @@ def test_outliers_and_holes_are_not_seen() -> None:
     errors = rng.normal(size=(400, 2, SAMPLES))
     errors[:, :, 20] += 1e3 * rng.normal(size=(400, 2))
     errors[:, 1, 140:] = np.nan
-    assert claim_error(_walls(1.2 * errors), 3) == pytest.approx(1.2, rel=0.35)
+    assert claim_error(*_walls(1.2 * errors), 3) == pytest.approx(1.2, rel=0.35)
     errors[:, :, 20] = np.nan
-    assert claim_error(_walls(1.2 * errors), 3) == pytest.approx(1.2, rel=0.04)
+    assert claim_error(*_walls(1.2 * errors), 3) == pytest.approx(1.2, rel=0.04)
 
 
 def test_where_hardly_anything_was_seen_claims_are_believed() -> None:
     errors = 2 * np.random.default_rng(6).normal(size=(40, 2, SAMPLES))
-    assert claim_error([], 3) == 1.0
-    assert claim_error(_walls(errors[:, :, :8]), 3) == 1.0
+    assert claim_error(*_walls(errors[:0]), 3) == 1.0
+    assert claim_error(*_walls(errors[:, :, :8]), 3) == 1.0
     few = ENOUGH // (2 * (SAMPLES - 8))
-    assert claim_error(_walls(errors[:few]), 3) == 1.0
-    assert claim_error(_walls(errors[: few + 1]), 3) == pytest.approx(2.0, rel=0.1)
+    assert claim_error(*_walls(errors[:few]), 3) == 1.0
+    assert claim_error(*_walls(errors[: few + 1]), 3) == pytest.approx(2.0, rel=0.1)
     # an error is never believed to be more than three times, or less than half, of what it claims
-    assert claim_error(_walls(5 * errors), 1) == 3.0
-    assert claim_error(_walls(0.1 * errors), 1) == 0.5
+    assert claim_error(*_walls(5 * errors), 1) == 3.0
+    assert claim_error(*_walls(0.1 * errors), 1) == 0.5

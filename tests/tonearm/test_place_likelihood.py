@@ -11,6 +11,8 @@ from gramoscope.tonearm.place_likelihood import abreast, place_log_likelihood
 
 STEP_M = 3.1e-6
 SIGMA_M = 6e-8
+Stretch = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Bins, values and variances of readings."""
 
 
 def _both(prior: GroovePrior, bins: np.ndarray, value: np.ndarray, variance: np.ndarray) -> tuple[float, float]:
@@ -22,15 +24,16 @@ def _both(prior: GroovePrior, bins: np.ndarray, value: np.ndarray, variance: np.
     count = int(bins[-1]) + 1
     moves = Moves(a[None, None], sigma**2 * q[None, None], np.zeros(count, np.int64), np.ones(count))
     long = forward(moves, readings, blank(covariance), gate=Gate(4.0)).log_likelihood
-    short = place_log_likelihood(
-        (a, q),
-        prior.at_rest(STEP_M),
-        abreast([(bins, value, variance)]),
-        np.array([sigma]),
-        place_sigma_m=1e-4,
-        gate=4.0,
-    )
-    return long, short
+    return long, _short(prior, [(bins, value, variance)], np.array([sigma]))
+
+
+def _short(prior: GroovePrior, stretches: list[Stretch], sigma: np.ndarray) -> float:
+    place, errors = np.full((2, len(stretches), 1 + max(int(bins[-1]) for bins, _, _ in stretches)), np.nan)
+    for i, (bins, value, variance) in enumerate(stretches):
+        place[i, bins], errors[i, bins] = value, variance
+    given = abreast(place, errors)
+    a, q = prior.steps(STEP_M)
+    return float(place_log_likelihood(a, q, prior.at_rest(STEP_M), given.seen, given.count, sigma, 1e-4, 4.0))
 
 
 def test_stretches_know_nothing_of_each_other() -> None:
@@ -40,18 +43,8 @@ def test_stretches_know_nothing_of_each_other() -> None:
     stretches = [(np.arange(n), 2e-7 * rng.normal(size=n), np.full(n, SIGMA_M**2)) for n in lengths]
     sigma = rng.uniform(0.02, 0.05, 11)
 
-    def likelihood(some: slice) -> float:
-        return place_log_likelihood(
-            prior.steps(STEP_M),
-            prior.at_rest(STEP_M),
-            abreast(stretches[some]),
-            sigma[some],
-            place_sigma_m=1e-4,
-            gate=4.0,
-        )
-
-    apart = sum(likelihood(slice(i, i + 1)) for i in range(11))
-    assert likelihood(slice(0, 11)) == pytest.approx(apart, rel=1e-12)
+    apart = sum(_short(prior, stretches[i : i + 1], sigma[i : i + 1]) for i in range(11))
+    assert _short(prior, stretches, sigma) == pytest.approx(apart, rel=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(3))

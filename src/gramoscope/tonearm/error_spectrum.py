@@ -128,8 +128,8 @@ def _believed(models: Sequence[GrooveModel], starts: IntArray, lengths: IntArray
         power[run] = model.sigma**2 * (float(restless.sum()) / restless.size if restless.size else 1.0)
     believed = np.empty((starts.size, 2, wavenumber.shape[1]))
     # one prior holds for many stretches
-    for priors in {models[number].priors for number in numbers}:
-        mine = [run for run, number in enumerate(numbers) if models[number].priors == priors]
+    for priors in {models[number].beliefs.priors for number in numbers}:
+        mine = [run for run, number in enumerate(numbers) if models[number].beliefs.priors == priors]
         for i, prior in enumerate(priors):
             believed[mine, i] = power[mine, i, None] * prior.slope_density(wavenumber[mine])
     return believed

@@ -83,17 +83,17 @@ class GroovePrior:
 
     def steps(self, step_m: float) -> tuple[FloatArray, FloatArray]:
         """Return A and Q for one step of the grid, shape (8, 8) each, the state in metres and var u = 1."""
-        a, q = _steps(self._shape, step_m)
+        a, q = steps(self._shape, step_m)
         return a, q
 
     def at_rest(self, step_m: float) -> FloatArray:
         """Return the covariance of all but the place before anything was seen, shape (7, 7), for var u = 1."""
-        resting: FloatArray = _process(self._shape, step_m)[2]
+        resting: FloatArray = process(self._shape, step_m)[2]
         return resting
 
     def bend(self, step_m: float) -> float:
         """Return the standard deviation of (a(s + ℓ) − 2a(s) + a(s − ℓ))/ℓ, ℓ = `BEND_M`, for var u = 1."""
-        return float(np.sqrt(_bend_variance(self._shape, step_m)) / BEND_M)
+        return float(bend(self._shape, step_m))
 
     @property
     def _shape(self) -> tuple[float, float, float, float]:
@@ -101,7 +101,7 @@ class GroovePrior:
 
 
 @numba.njit(cache=True, nogil=True)
-def _process(shape, step_m):  # type: ignore[no-untyped-def]
+def process(shape, step_m):  # type: ignore[no-untyped-def]
     """F, density of the noise, and covariance at rest of (u, …, u‴, v, v′, v″), in steps and for var u = 1.
 
     With x the derivatives of a stationary process, E[x⁽ⁱ⁾x⁽ʲ⁾] = ± r_{(i+j)/2} for even i + j, else 0. Multiplied with each
@@ -141,21 +141,22 @@ def _stationary(resting, first, powers, scale):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _steps(shape, step_m):  # type: ignore[no-untyped-def]
-    drift, noise, _ = _process(shape, step_m)
+def steps(shape, step_m):  # type: ignore[no-untyped-def]
+    """Return what `GroovePrior.steps` does."""
+    drift, noise, _ = process(shape, step_m)
     return _one_step(drift, noise)
 
 
 @numba.njit(cache=True, nogil=True)
-def _bend_variance(shape, step_m):  # type: ignore[no-untyped-def]
-    """Variance of a(s + ℓ) − 2a(s) + a(s − ℓ)."""
-    drift, noise, resting = _process(shape, step_m)
+def bend(shape, step_m):  # type: ignore[no-untyped-def]
+    """Return what `GroovePrior.bend` does."""
+    drift, noise, resting = process(shape, step_m)
     lag = BEND_M / step_m
     a, q = _one_step(lag * drift, lag * noise)
     later = a[0].copy()
     later[0] -= 2.0
     now = (later @ a)[1:]
-    return now @ resting @ now + later @ q @ later + q[0, 0]
+    return np.sqrt(now @ resting @ now + later @ q @ later + q[0, 0]) / BEND_M
 
 
 def start(at_rest: FloatArray, sigma: float, *, place_sigma_m: float) -> FloatArray:

@@ -8,16 +8,16 @@ learned but given (`tonearm.level`).
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import numba
 import numpy as np
 from scipy import optimize
 
-from gramoscope.conventions import FloatArray, IntArray
-from gramoscope.tonearm.groove_prior import GroovePrior
+from gramoscope.conventions import FloatArray
+from gramoscope.tonearm.groove_prior import GroovePrior, bend, process, steps
 from gramoscope.tonearm.level import LEAST_SAMPLES, OneDirection, slope_power
 from gramoscope.tonearm.place_likelihood import PlaceReadings, abreast, place_log_likelihood
 
@@ -73,25 +73,6 @@ class PriorLimits:
 
 
 @dataclass(frozen=True, eq=False)
-class Lesson:
-    """What a stretch tells of one direction.
-
-    Attributes
-    ----------
-    seen : OneDirection
-    level : float
-        How loud it is.
-    correlation_samples : float
-        How many neighbours share one error (`WallTrace`). To what is slower than that such readings are like independent
-        ones of so many times the variance.
-    """
-
-    seen: OneDirection
-    level: float
-    correlation_samples: float = 1.0
-
-
-@dataclass(frozen=True, eq=False)
 class Lessons:
     """What some stretches teach of one direction: readings, how loud each is, and the mean square of its slopes.
 
@@ -104,38 +85,37 @@ class Lessons:
     slope_power: FloatArray
 
 
-def lessons(stretches: Iterable[Lesson], step_m: float, *, block: int = 1) -> Lessons | None:
+def lessons(
+    seen: OneDirection, level: FloatArray, correlation_samples: FloatArray, step_m: float, *, block: int = 1
+) -> Lessons | None:
     """Return what all stretches teach together; None when all were hardly seen.
 
     Parameters
     ----------
-    stretches : iterable of Lesson
+    seen : OneDirection
+    level : float64 array, shape (stretch,)
+        How loud each is.
+    correlation_samples : float64 array, shape (stretch,)
+        How many neighbours share one error (`WallTrace`). To what is slower than that such readings are like independent
+        ones of so many times the variance.
     step_m : float
         From one sample to the next.
     block : int
         So many neighbours are taken for one reading, where all of them are known: as good for what changes slowly, and
         learned from in so many times less time.
     """
-    both = [(lesson, _means(lesson.seen, block)) for lesson in stretches]
-    seen = [(lesson, means) for lesson, means in both if block * means.known >= LEAST_SAMPLES]
-    if not seen:
+    count = seen.place_m.shape[1] // block
+    place, variance = (values[:, : count * block].reshape(-1, count, block) for values in (seen.place_m, seen.variance))
+    means, errors = place.mean(axis=2), variance.sum(axis=2) / block**2
+    known = np.isfinite(means)
+    enough = block * np.count_nonzero(known, axis=1) >= LEAST_SAMPLES
+    if not enough.any():
         return None
-    power = [slope_power(lesson.seen, step_m) for lesson, _ in seen]
-    readings = [_counted_from_the_first(means, lesson.correlation_samples) for lesson, means in seen]
-    level = np.array([lesson.level for lesson, _ in seen])
-    return Lessons(block * step_m, abreast(readings), level, np.array(power))
-
-
-def _means(one: OneDirection, block: int) -> OneDirection:
-    count = one.place_m.size // block
-    place, variance = (values[: count * block].reshape(count, block) for values in (one.place_m, one.variance))
-    return OneDirection(place.mean(axis=1), variance.sum(axis=1) / block**2)
-
-
-def _counted_from_the_first(one: OneDirection, correlation_samples: float) -> tuple[IntArray, FloatArray, FloatArray]:
-    known = np.flatnonzero(np.isfinite(one.place_m))
-    place = one.place_m[known]
-    return known - known[0], place - place[0], correlation_samples * one.variance[known]
+    means, errors, first = means[enough], errors[enough], known[enough].argmax(axis=1)
+    counted_from_the_first = means - np.take_along_axis(means, first[:, None], axis=1)
+    readings = abreast(counted_from_the_first, correlation_samples[enough, None] * errors)
+    power = slope_power(OneDirection(seen.place_m[enough], seen.variance[enough]), step_m)
+    return Lessons(block * step_m, readings, level[enough], power)
 
 
 def learn(given: Lessons | None, limits: PriorLimits, *, before: GroovePrior | None = None) -> GroovePrior:
@@ -156,7 +136,7 @@ def learn(given: Lessons | None, limits: PriorLimits, *, before: GroovePrior | N
     """
     if given is None:
         return before or limits.middle
-    heard = np.isfinite(given.slope_power)
+    heard, bounds = np.isfinite(given.slope_power), limits.logarithms.T
     power = float(np.mean(given.slope_power[heard])) if heard.any() else 0.0
     known, first, step = (
         _logarithms(before or limits.middle),
@@ -164,20 +144,14 @@ def learn(given: Lessons | None, limits: PriorLimits, *, before: GroovePrior | N
         np.array([1.0, -0.7, 0.4, 1.0, 0.4]),
     )
 
+    drift = DRIFT if before else UNHEARD
+    readings = given.readings.seen, given.readings.count
+
     def cost(logarithms: FloatArray) -> float:
-        change = (logarithms - known) / (DRIFT if before else UNHEARD)
-        prior = _prior(logarithms, limits)
-        # the slopes of each stretch, of their bodies
-        sigma = np.maximum(prior.share * given.level, prior.floor) / prior.bend(given.step_m)
-        disbelief = 0.5 * float(change @ change) + 0.5 * _louder(sigma[heard], power) ** 2
-        return disbelief - place_log_likelihood(
-            prior.steps(given.step_m),
-            prior.at_rest(given.step_m),
-            given.readings,
-            sigma,
-            place_sigma_m=ANYWHERE_M,
-            gate=GATE,
-        )
+        inside = np.clip(logarithms, *bounds)
+        away = (logarithms - known) / drift
+        believed = 0.5 * float(away @ away)
+        return believed + float(_cost(inside, limits.floor, given.step_m, given.level, heard, power, *readings))
 
     # what was learned in silence can be so far off that nothing leads away from it
     if before and cost(known) <= cost(first):
@@ -189,7 +163,20 @@ def learn(given: Lessons | None, limits: PriorLimits, *, before: GroovePrior | N
     return _prior(found, limits)
 
 
-def _louder(sigma: FloatArray, power: float) -> float:
+@numba.njit(cache=True, nogil=True)
+def _cost(logarithms, floor, step_m, level, heard, power, seen, count):  # type: ignore[no-untyped-def]
+    """How unlikely the readings are, and how loud they, under a prior; of what was believed before only their part."""
+    values = np.exp(logarithms)
+    shape = (values[0], values[1], values[2], values[3])
+    # the slopes of each stretch, of their bodies
+    sigma = np.maximum(values[4] * level, floor) / bend(shape, step_m)
+    a, q = steps(shape, step_m)
+    likely = place_log_likelihood(a, q, process(shape, step_m)[2], seen, count, sigma, ANYWHERE_M, GATE)
+    return 0.5 * _louder(sigma[heard], power) ** 2 - likely
+
+
+@numba.njit(cache=True, nogil=True)
+def _louder(sigma, power):  # type: ignore[no-untyped-def]
     """How many standard errors louder the prior believes the groove to be than the power of its slopes is.
 
     The likelihood knows the spectrum best where it meets the noise; extrapolated to the bass from there, it would fill gaps
@@ -197,7 +184,7 @@ def _louder(sigma: FloatArray, power: float) -> float:
     """
     if power <= 0:
         return 0.0
-    return 0.5 * math.log(float(sigma @ sigma) / sigma.size / power) / SLOPE_SIGMA
+    return 0.5 * np.log(np.sum(sigma**2) / sigma.size / power) / SLOPE_SIGMA
 
 
 def _least(

@@ -16,11 +16,10 @@ from itertools import chain, repeat
 import numba
 import numpy as np
 
-from gramoscope.conventions import INNER, OUTER, FloatArray
+from gramoscope.conventions import INNER, OUTER, FloatArray, IntArray
 from gramoscope.disc.formats import Direction
 from gramoscope.quantile import quantile
 from gramoscope.tonearm.groove_prior import BEND_M
-from gramoscope.tonearm.stretches import Stretch
 
 LEAST_SAMPLES = 20
 """A stretch with fewer tells nothing."""
@@ -43,72 +42,117 @@ NEIGHBOURS = 2
 
 
 @dataclass(frozen=True, eq=False)
-class Walls:
-    """Place and variance of both walls, shape (2, sample), NaN where unknown."""
-
-    place_m: FloatArray
-    variance: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
 class OneDirection:
-    """One direction along one stretch: place and its variance, shape (sample,), NaN where unknown."""
+    """One direction along stretches: place and its variance, shape (stretch, sample), NaN where unknown."""
 
     place_m: FloatArray
     variance: FloatArray
 
-    @property
-    def known(self) -> int:
-        """How many samples there are."""
-        return int(np.count_nonzero(np.isfinite(self.place_m)))
 
-
-def trusted(stretch: Stretch) -> Walls:
-    """Return the samples of a stretch that are not suspect."""
-    return Walls(np.where(stretch.suspect, np.nan, stretch.place_m), stretch.variance)
-
-
-def calmed(stretch: Stretch) -> Walls:
-    """Return the running medians of a stretch, which outliers hardly move."""
-    return Walls(stretch.middle_m, MEDIAN_VARIANCE * stretch.variance)
-
-
-def one_direction(walls: Walls, direction: Direction, gains: FloatArray, *, listening: bool) -> OneDirection:
+def one_direction(
+    place_m: FloatArray,
+    variance: FloatArray,
+    direction: Direction,
+    gains: FloatArray,
+    *,
+    listening: bool,
+    size: IntArray | None = None,
+) -> OneDirection:
     """Return what both walls together say of one direction.
 
     Parameters
     ----------
-    walls : Walls
+    place_m, variance : float64 arrays, shape (stretch, 2, sample)
+        NaN where unknown.
     direction : {"lateral", "vertical"}
     gains : float64 array, shape (2,)
         How far the inner and the outer wall move towards +l when the groove rises by one.
     listening : bool
         If hardly ever both walls were seen, the one that was seen better is taken as if the groove moved in this
         direction only.
+    size : int64 array, shape (stretch,), optional
+        Of each stretch only so many samples are its own; all if left out.
 
     Returns
     -------
     OneDirection
         Free of the other direction; NaN where not both walls were seen.
     """
-    seen = np.isfinite(walls.place_m)
-    if listening and np.count_nonzero(seen.all(axis=0)) < BOTH_WALLS * seen.shape[1]:
-        best = int(np.argmax(seen.sum(axis=1)))
-        gain = 1.0 if direction == "lateral" else gains[best]
-        return OneDirection(walls.place_m[best] / gain, walls.variance[best] / gain**2)
-    weight = np.array([gains[OUTER], -gains[INNER]] if direction == "lateral" else [-1.0, 1.0])
-    weight = weight / (gains[OUTER] - gains[INNER])
-    return OneDirection(weight @ walls.place_m, weight**2 @ walls.variance)
-
-
-def bend_power(one: OneDirection, step_m: float) -> float:
-    """Return the variance of the bends of one stretch; below zero by chance when silent, NaN when hardly seen."""
-    lag = max(int(np.rint(BEND_M / step_m)), 1)
-    return float(_bend_power(one.place_m, one.variance, lag) / (lag * step_m) ** 2)
+    place, error = np.empty((2, len(place_m), place_m.shape[2]))
+    own = np.full(len(place_m), place_m.shape[2]) if size is None else size
+    _of_each(place_m, variance, direction == "lateral", gains, listening, own, place, error)
+    return OneDirection(place, error)
 
 
 @numba.njit(cache=True, nogil=True)
-def _bend_power(place_m, variance, lag):  # type: ignore[no-untyped-def]
+def _of_each(place_m, variance, lateral, gains, listening, size, out, error):  # type: ignore[no-untyped-def]
+    for i in range(len(place_m)):
+        _one_direction(place_m[i], variance[i], lateral, gains, listening, size[i], out[i], error[i])
+
+
+@numba.njit(cache=True, nogil=True)
+def _one_direction(place_m, variance, lateral, gains, listening, own, out, error):  # type: ignore[no-untyped-def]
+    size, both = place_m.shape[1], 0
+    seen = np.zeros(2, np.int64)
+    for k in range(size):
+        inner, outer = np.isfinite(place_m[INNER, k]), np.isfinite(place_m[OUTER, k])
+        seen[INNER] += inner
+        seen[OUTER] += outer
+        both += inner and outer
+    apart = gains[OUTER] - gains[INNER]
+    weight = np.empty(2)
+    if listening and both < BOTH_WALLS * own:
+        best = np.argmax(seen)
+        gain = 1.0 if lateral else gains[best]
+        for k in range(size):
+            out[k], error[k] = place_m[best, k] / gain, variance[best, k] / gain**2
+        return
+    weight[INNER], weight[OUTER] = (gains[OUTER] / apart, -gains[INNER] / apart) if lateral else (-1 / apart, 1 / apart)
+    for k in range(size):
+        out[k] = weight[0] * place_m[0, k] + weight[1] * place_m[1, k]
+        error[k] = weight[0] ** 2 * variance[0, k] + weight[1] ** 2 * variance[1, k]
+
+
+def bend_powers(
+    place_m: FloatArray, variance: FloatArray, gains: FloatArray, *, listened: Direction, step_m: float
+) -> FloatArray:
+    """Return the variances of the bends of one stretch in both directions, lateral first.
+
+    Parameters
+    ----------
+    place_m, variance : float64 arrays, shape (2, sample)
+        Of both walls, NaN where unknown.
+    gains : float64 array, shape (2,)
+        See `one_direction`.
+    listened : {"lateral", "vertical"}
+        The direction that is listened to.
+    step_m : float
+        From one sample to the next.
+
+    Returns
+    -------
+    float64 array, shape (2,)
+        Below zero by chance when silent, NaN when hardly seen.
+    """
+    lag = max(int(np.rint(BEND_M / step_m)), 1)
+    power: FloatArray = _bend_powers(place_m, variance, gains, listened == "lateral", lag)
+    return power / (lag * step_m) ** 2
+
+
+@numba.njit(cache=True, nogil=True)
+def _bend_powers(place_m, variance, gains, laterally, lag):  # type: ignore[no-untyped-def]
+    power, place, error = np.empty(2), np.empty(place_m.shape[1]), np.empty(place_m.shape[1])
+    for direction in range(2):
+        _one_direction(
+            place_m, variance, direction == 0, gains, (direction == 0) == laterally, place.size, place, error
+        )
+        power[direction] = bend_power(place, error, lag)
+    return power
+
+
+@numba.njit(cache=True, nogil=True)
+def bend_power(place_m, variance, lag):  # type: ignore[no-untyped-def]
+    """Return the variance of second differences over a lag, without what errors make of them."""
     bends, noise = np.empty(place_m.size), np.empty(place_m.size)
     seen = 0
     for i in range(lag, place_m.size - lag):
@@ -121,18 +165,18 @@ def _bend_power(place_m, variance, lag):  # type: ignore[no-untyped-def]
     return (NORMAL * quantile(bends[:seen], 0.5)) ** 2 - quantile(noise[:seen], 0.5)
 
 
-def slope_power(one: OneDirection, step_m: float) -> float:
-    """Return the mean square of the slopes of one stretch over `BEND_M`; below zero by chance when silent, or NaN."""
+def slope_power(one: OneDirection, step_m: float) -> FloatArray:
+    """Return the mean square of the slopes of each stretch over `BEND_M`; below zero by chance when silent, or NaN."""
     lag = max(int(np.rint(BEND_M / step_m)), 1)
-    moved = one.place_m[lag:] - one.place_m[:-lag]
-    noise = one.variance[lag:] + one.variance[:-lag]
+    moved = one.place_m[:, lag:] - one.place_m[:, :-lag]
+    noise = one.variance[:, lag:] + one.variance[:, :-lag]
     seen = np.isfinite(moved) & np.isfinite(noise)
-    if np.count_nonzero(seen) < LEAST_SAMPLES:
-        return float("nan")
-    return float((np.mean(moved[seen] ** 2) - np.mean(noise[seen])) / (lag * step_m) ** 2)
+    known = np.count_nonzero(seen, axis=1)
+    power = np.where(seen, moved**2 - noise, 0.0).sum(axis=1) / np.maximum(known, 1)
+    return np.where(known < LEAST_SAMPLES, np.nan, power / (lag * step_m) ** 2)
 
 
-def claim_error(walls: Iterable[Walls], longest: int) -> float:
+def claim_error(place_m: FloatArray, variance: FloatArray, longest: int) -> float:
     """Return how many times as large as they claim the errors of places are, just above the frequencies of sound.
 
     By the eighth differences of means over blocks of neighbours, over what the claimed errors would make of them: they hear
@@ -143,7 +187,8 @@ def claim_error(walls: Iterable[Walls], longest: int) -> float:
 
     Parameters
     ----------
-    walls : iterable of Walls
+    place_m, variance : float64 arrays, shape (stretch, 2, sample)
+        NaN where unknown.
     longest : int
         Samples of the longest block, at least one.
 
@@ -152,10 +197,9 @@ def claim_error(walls: Iterable[Walls], longest: int) -> float:
     float
         Within 0.5 … 3; 1 where hardly anything was seen.
     """
-    seen, error = list(walls), 1.0
+    error = 1.0
     for block in range(1, longest + 1):
-        off = [_eighth_differences(one.place_m, one.variance, block) for one in seen]
-        known = np.concatenate(off) if off else np.empty(0)
+        known = _eighth_differences(place_m, variance, block)
         if known.size < ENOUGH * block:
             break
         longer = float(quantile(known, WITHIN_SIGMA))
@@ -168,22 +212,26 @@ def claim_error(walls: Iterable[Walls], longest: int) -> float:
 @numba.njit(cache=True, nogil=True)
 def _eighth_differences(place_m, variance, block):  # type: ignore[no-untyped-def]
     """Sizes of the differences between means over blocks in units of what the claimed errors make of them, where known."""
+    stretches, walls, size = place_m.shape
     span = block * EIGHTH_DIFFERENCE.size
-    off = np.empty(2 * max(place_m.shape[1] - span + 1, 0))
+    off = np.empty(stretches * walls * max(size - span + 1, 0))
+    place_sum, variance_sum = np.empty(size), np.empty(size)
     known = 0
-    for wall in range(2):
-        for first in range(place_m.shape[1] - span + 1):
-            difference, claimed = 0.0, 0.0
-            for j in range(EIGHTH_DIFFERENCE.size):
-                place_sum, variance_sum = 0.0, 0.0
-                for k in range(first + j * block, first + (j + 1) * block):
-                    place_sum += place_m[wall, k]
-                    variance_sum += variance[wall, k]
-                difference += EIGHTH_DIFFERENCE[j] * place_sum
-                claimed += EIGHTH_DIFFERENCE[j] ** 2 * variance_sum
-            if np.isfinite(difference) and claimed > 0:
-                off[known] = abs(difference) / np.sqrt(claimed)
-                known += 1
+    for i in range(stretches):
+        for wall in range(walls):
+            for first in range(size - block + 1):
+                place_sum[first], variance_sum[first] = 0.0, 0.0
+                for k in range(first, first + block):
+                    place_sum[first] += place_m[i, wall, k]
+                    variance_sum[first] += variance[i, wall, k]
+            for first in range(size - span + 1):
+                difference, claimed = 0.0, 0.0
+                for j in range(EIGHTH_DIFFERENCE.size):
+                    difference += EIGHTH_DIFFERENCE[j] * place_sum[first + j * block]
+                    claimed += EIGHTH_DIFFERENCE[j] ** 2 * variance_sum[first + j * block]
+                if np.isfinite(difference) and claimed > 0:
+                    off[known] = abs(difference) / np.sqrt(claimed)
+                    known += 1
     return off[:known]
 
 

@@ -6,13 +6,12 @@ The same recursion as `linear_gaussian.forward` for one process and readings of 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numba
 import numpy as np
 
-from gramoscope.conventions import FloatArray, IntArray
+from gramoscope.conventions import FloatArray
 from gramoscope.tonearm.abreast import (
     DISTANCE,
     FILTERS,
@@ -49,16 +48,26 @@ class PlaceReadings:
     count: int
 
 
-def abreast(stretches: Sequence[tuple[IntArray, FloatArray, FloatArray]]) -> PlaceReadings:
-    """Return the readings of several stretches, given by their bins, rising from 0 on, values and variances."""
-    eights = -(-len(stretches) // FILTERS)
-    longest = max(int(bins[-1]) + 1 for bins, _, _ in stretches)
-    seen = np.zeros((eights, longest, 2, FILTERS))
+def abreast(place_m: FloatArray, variance: FloatArray) -> PlaceReadings:
+    """Return the readings of stretches, given bin by bin, shape (stretch, bin), NaN where nothing was read.
+
+    Of each stretch something must have been read.
+    """
+    known = np.isfinite(place_m)
+    first, stop = known.argmax(axis=1), known.shape[1] - known[:, ::-1].argmax(axis=1)
+    seen = np.zeros((-(-len(place_m) // FILTERS), int((stop - first).max()), 2, FILTERS))
     seen[:, :, VARIANCE] = np.inf
-    for number, (bins, value, variance) in enumerate(stretches):
-        eight, place = divmod(number, FILTERS)
-        seen[eight, bins, VALUE, place], seen[eight, bins, VARIANCE, place] = value, variance
-    return PlaceReadings(seen, len(stretches), sum(bins.size for bins, _, _ in stretches))
+    _lay_abreast(place_m, variance, first, seen)
+    return PlaceReadings(seen, len(place_m), int(np.count_nonzero(known)))
+
+
+@numba.njit(cache=True, nogil=True)
+def _lay_abreast(place_m, variance, first, seen):  # type: ignore[no-untyped-def]
+    for i in range(len(place_m)):
+        for k in range(first[i], place_m.shape[1]):
+            if np.isfinite(place_m[i, k]):
+                seen[i // FILTERS, k - first[i], VALUE, i % FILTERS] = place_m[i, k]
+                seen[i // FILTERS, k - first[i], VARIANCE, i % FILTERS] = variance[i, k]
 
 
 @numba.njit(cache=True, nogil=True)
@@ -77,42 +86,17 @@ def _begin(at_rest, place_sigma_m, sigma, first, rows, state, tally):  # type: i
 
 
 @numba.njit(cache=True, nogil=True)
-def _of_all(a, q, at_rest, place_sigma_m, sigma, seen, width, rows):  # type: ignore[no-untyped-def]
-    """Sum of ν²/S + log S over all readings."""
-    now, later, tally = np.empty((ROWS, FILTERS)), np.empty((ROWS, FILTERS)), np.empty((3, FILTERS))
-    total = 0.0
-    for eight in range(seen.shape[0]):
-        _begin(at_rest, place_sigma_m, sigma, eight * FILTERS, rows, now, tally)
-        readings = seen[eight].reshape(-1, FILTERS)
-        for k in range(seen.shape[1]):
-            step(width**2, a, 0, 0, q, 0, 0, now, 0, 0, readings, 2 * k, 0, later, 0, 0, tally, 0, 0)
-            now, later = later, now
-            if k % AT_ONCE == AT_ONCE - 1 or k == seen.shape[1] - 1:
-                for place in range(FILTERS):
-                    total += np.log(tally[SPREAD, place])
-                    tally[SPREAD, place] = 1.0
-        total += tally[DISTANCE].sum()
-    return total
-
-
-def place_log_likelihood(
-    steps: tuple[FloatArray, FloatArray],
-    at_rest: FloatArray,
-    readings: PlaceReadings,
-    sigma: FloatArray,
-    *,
-    place_sigma_m: float,
-    gate: float,
-) -> float:
+def place_log_likelihood(a, q, at_rest, seen, count, sigma, place_sigma_m, gate):  # type: ignore[no-untyped-def]
     """Return the log-likelihood of readings of one process along stretches that know nothing of each other.
 
     Parameters
     ----------
-    steps : float64 arrays, shape (n, n)
-        A and Q: x' = A x + w, E[w wᵀ] = σ²Q, from bin to bin, of a `GroovePrior`.
+    a, q : float64 arrays, shape (n, n)
+        x' = A x + w, E[w wᵀ] = σ²Q, from bin to bin, of a `GroovePrior`.
     at_rest : float64 array, shape (n − 1, n − 1)
         Covariance of all but the place at bin 0, for σ = 1; the mean of all is zero.
-    readings : PlaceReadings
+    seen, count
+        Of `PlaceReadings`.
     sigma : float64 array, shape (stretch,)
         σ.
     place_sigma_m : float
@@ -120,6 +104,18 @@ def place_log_likelihood(
     gate : float
         A reading further than this many standard deviations from its prediction is rejected, and counts as if it lay there.
     """
-    a, q = steps
-    distance = _of_all(a, q, at_rest, place_sigma_m, sigma, readings.seen, gate, _COVARIANCE_ROWS)
-    return -0.5 * (readings.count * LOG_2PI + float(distance))
+    now, later, tally = np.empty((ROWS, FILTERS)), np.empty((ROWS, FILTERS)), np.empty((3, FILTERS))
+    # of ν²/S + log S of all readings
+    total = 0.0
+    for eight in range(seen.shape[0]):
+        _begin(at_rest, place_sigma_m, sigma, eight * FILTERS, _COVARIANCE_ROWS, now, tally)
+        readings = seen[eight].reshape(-1, FILTERS)
+        for k in range(seen.shape[1]):
+            step(gate**2, a, 0, 0, q, 0, 0, now, 0, 0, readings, 2 * k, 0, later, 0, 0, tally, 0, 0)
+            now, later = later, now
+            if k % AT_ONCE == AT_ONCE - 1 or k == seen.shape[1] - 1:
+                for place in range(FILTERS):
+                    total += np.log(tally[SPREAD, place])
+                    tally[SPREAD, place] = 1.0
+        total += tally[DISTANCE].sum()
+    return -0.5 * (count * LOG_2PI + total)

@@ -12,10 +12,6 @@ from gramoscope.conventions import BoolArray, FloatArray, IntArray
 from gramoscope.quality import FlagArray
 from gramoscope.tonearm.groove_prior import taylor
 from gramoscope.tonearm.linear_gaussian import Readings
-from gramoscope.tonearm.stretches import Stretch
-
-LEAST_SHARE = 1e-3
-"""Samples that keep less of their information are left out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +41,7 @@ class PlaceSamples:
     suspect: BoolArray
     flags: FlagArray
 
-    def part(self, keep: BoolArray | IntArray) -> PlaceSamples:
+    def part(self, keep: BoolArray | IntArray | slice) -> PlaceSamples:
         """Return some of the samples."""
         return PlaceSamples(
             self.arc_m[keep],
@@ -92,23 +88,6 @@ def _both_directions(row, gain):  # type: ignore[no-untyped-def]
         for i in range(size):
             out[j, i], out[j, size + i] = row[j, i], row[j, i] * gain[j]
     return out
-
-
-def samples_of(stretch: Stretch, step_m: float) -> PlaceSamples:
-    """Return the samples of one stretch, both walls in turn."""
-    keeps = np.maximum(stretch.share, LEAST_SHARE)
-    place = np.where(stretch.share > LEAST_SHARE, stretch.place_m, np.nan)
-    arc = np.repeat(stretch.arc_m, 2)
-    return PlaceSamples(
-        arc,
-        np.rint(arc / step_m).astype(np.int64),
-        np.tile(np.arange(2), stretch.arc_m.size),
-        place.ravel(order="F"),
-        (stretch.variance * stretch.correlation_samples / keeps).ravel(order="F"),
-        stretch.variance.ravel(order="F"),
-        stretch.suspect.ravel(order="F"),
-        stretch.flags.ravel(order="F"),
-    )
 
 
 def joined(pieces: Sequence[PlaceSamples]) -> PlaceSamples:
