@@ -20,8 +20,10 @@ if TYPE_CHECKING:
     import numpy as np
 
     from gramoscope.pickup.overlay import Overlay
-    from gramoscope.pickup.texture.hearing import Ear
+    from gramoscope.pickup.texture.hearing import Ear, Told
+    from gramoscope.pickup.texture.layout import StripeLayout
     from gramoscope.pickup.texture.sharpness import Sharpness
+    from gramoscope.pickup.texture.stretch import Stretch
     from gramoscope.pickup.texture.tone import Tone
 
 Kept = Any
@@ -84,14 +86,14 @@ class Device(Protocol):
         """Return a picture seen in a tone."""
         ...
 
-    def heard(
+    def told(
         self,
         ear: Ear,
-        columns: Kept,
-        rows: FloatArray,
-        clear: BoolArray,
+        layout: StripeLayout,
+        stretch: Stretch,
         *,
+        least_support: float,
         power_limits: tuple[float, float],
-    ) -> tuple[FloatArray, Float32Array]:
-        """Return what the stripes of an ear say of their paths, and its weight; see `texture.hearing.heard`."""
+    ) -> Told:
+        """Return what the stripes of an ear say of the present path of both walls; see `texture.hearing.told`."""
         ...

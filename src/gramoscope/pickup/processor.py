@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -11,10 +12,14 @@ from gramoscope.conventions import BoolArray, Float32Array, FloatArray, IntArray
 from gramoscope.pickup.device import Film
 from gramoscope.pickup.overlay import Overlay, overlay, places_brighter
 from gramoscope.pickup.registration import frame_shifts
-from gramoscope.pickup.texture.hearing import Ear, heard
+from gramoscope.pickup.texture.hearing import Ear, Told, told
+from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.sharpness import Sharpness, sharpness
 from gramoscope.pickup.texture.tone import Tone
 from gramoscope.signal_path import FrameGroup
+
+if TYPE_CHECKING:
+    from gramoscope.pickup.texture.stretch import Stretch
 
 
 @dataclass(frozen=True)
@@ -56,17 +61,17 @@ class Processor:
         """See `texture.tone`."""
         return tone(columns)
 
-    def heard(
+    def told(
         self,
         ear: Ear,
-        columns: Float32Array,
-        rows: FloatArray,
-        clear: BoolArray,
+        layout: StripeLayout,
+        stretch: Stretch,
         *,
+        least_support: float,
         power_limits: tuple[float, float],
-    ) -> tuple[FloatArray, Float32Array]:
-        """See `texture.hearing.heard`."""
-        return heard(ear, columns, rows, clear, power_limits=power_limits)
+    ) -> Told:
+        """See `texture.hearing.told`."""
+        return told(ear, layout, stretch, least_support=least_support, power_limits=power_limits)
 
 
 PROCESSOR = Processor()

@@ -31,9 +31,11 @@ from gramoscope.pickup.registration import (
     textured_rows,
 )
 from gramoscope.pickup.texture.following import REACH, places_of
-from gramoscope.pickup.texture.hearing import Ear
+from gramoscope.pickup.texture.hearing import Ear, Told, told_by
+from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.likelihood import TEMPER, TEXTURE_PX
 from gramoscope.pickup.texture.sharpness import CELL_PX, Sharpness, sharpness_of, whole_pixels
+from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.pickup.texture.tone import Tone
 from gramoscope.signal_path import FrameGroup
 
@@ -117,6 +119,22 @@ class GraphicsCard:
         kernel(columns, np.float32(q / m), np.float32(1 - q), np.float32(m / q), seen)
         return seen
 
+    def told(
+        self,
+        ear: Ear,
+        layout: StripeLayout,
+        stretch: Stretch,
+        *,
+        least_support: float,
+        power_limits: tuple[float, float],
+    ) -> Told:
+        """See `texture.hearing.told`."""
+
+        def heard(rows: FloatArray, clear: BoolArray) -> tuple[FloatArray, Float32Array]:
+            return self.heard(ear, stretch.columns, rows, clear, power_limits=power_limits)
+
+        return told_by(heard, ear, layout, stretch, least_support=least_support)
+
     def heard(
         self,
         ear: Ear,
@@ -126,7 +144,7 @@ class GraphicsCard:
         *,
         power_limits: tuple[float, float],
     ) -> tuple[FloatArray, Float32Array]:
-        """See `texture.hearing.heard`."""
+        """Return what `texture.hearing.listen` writes."""
         there = self._ear(ear)
         white, weight = drawn(there, columns, *places_of(rows, ear.half_px + REACH), clear, power_limits)
         said = spoken(there, white, weight, first_bin=ear.band.bins(ear.length).start)

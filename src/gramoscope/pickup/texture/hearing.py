@@ -6,7 +6,7 @@ them hundreds of times a second, and there what lies between the steps would cos
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ import numpy as np
 
 from gramoscope.conventions import INNER, OUTER, BoolArray, Float32Array, FloatArray, IntArray
 from gramoscope.pickup.lane_writer import LANES
-from gramoscope.pickup.texture.following import REACH, STEPS, step_mixtures, step_of, wide_rows
+from gramoscope.pickup.texture.following import REACH, STEPS, step_mixtures, step_of, stepped, wide_rows
 from gramoscope.pickup.texture.lane_transform import PAIR, fold, let_through, plan_for, transform
 from gramoscope.pickup.texture.layout import StripeLayout, see_stripe
 from gramoscope.pickup.texture.likelihood import (
@@ -87,7 +87,7 @@ class Ear:
 
     @cached_property
     def for_listening(self) -> tuple[tuple[Float32Array | FloatArray, ...], tuple[Any, ...], int]:
-        """What `_listen` needs of an ear: its weights, the plan of its transforms, and the first bin of its band."""
+        """What `listen` needs of an ear: its weights, the plan of its transforms, and the first bin of its band."""
         plan = plan_for(self.length)
         weights = (self.half_taps, *self.in_lanes, self.sign, self.mean_score, self.trust)
         return weights, (plan.radix, plan.twiddle, plan.turn), self.band.bins(self.length).start
@@ -161,16 +161,17 @@ def clear_columns(
     """
     rows = np.empty((number.size, stretch.usable.size))
     clear = np.empty(rows.shape, np.bool_)
-    _clear(
-        stretch.displacement_px,
-        number,
+    _clear(stretch.displacement_px, number, *_in_sight(stretch, layout, half_px, least_support), rows, clear)
+    return rows, clear
+
+
+def _in_sight(stretch: Stretch, layout: StripeLayout, half_px: int, least_support: float) -> tuple[Any, Any, Any]:
+    """Return what `_clear` must know of the stripes, of what is needed of them, and of the picture."""
+    return (
         (layout.rest_row, layout.wall, layout.seen_between, layout.middle_row),
         (float(half_px), layout.on_wall_px(half_px), float(least_support)),
         (stretch.usable, stretch.burnt, stretch.support),
-        rows,
-        clear,
     )
-    return rows, clear
 
 
 @numba.njit(cache=True, nogil=True)
@@ -322,8 +323,11 @@ def _energies(answers, lane, sign, score, loudness):  # type: ignore[no-untyped-
 
 
 @numba.njit(cache=True, nogil=True)
-def _listen(columns, rows, clear, half_px, ear, plan, first_bin, limits, said, weight):  # type: ignore[no-untyped-def]
-    """One look at all stripes; their filters' answers come back as many at a time as there are lanes."""
+def listen(columns, rows, clear, half_px, ear, plan, first_bin, limits, said, weight):  # type: ignore[no-untyped-def]
+    """Write what the stripes say of their paths, `following.stepped`, and its weight: one look at all of them.
+
+    Their filters' answers come back as many at a time as there are lanes.
+    """
     half_taps, mixtures, usual, filters, sign, mean, trust = ear
     radix, twiddle, turn = plan
     stripes, width, count, m = rows.shape[0], columns.shape[0], sign.shape[1], len(turn) - 1
@@ -378,30 +382,81 @@ def add_up(said, weight, aside, wall, information, score, sum_of_information):  
             sum_of_information[wall[i], x] += information[i] * weight[i, x]
 
 
-def heard(
-    ear: Ear, columns: Float32Array, rows: FloatArray, clear: BoolArray, *, power_limits: tuple[float, float]
-) -> tuple[FloatArray, Float32Array]:
-    """Return what the stripes say of their paths.
+@dataclass(frozen=True, eq=False)
+class Told:
+    """What the stripes of a stretch say of the present path of both walls.
 
-    Parameters
+    Attributes
     ----------
-    ear : Ear
-    columns : float32 array, shape (column, row)
-        The picture, transposed, in the tone of the model.
-    rows : float64 array, shape (stripe, column)
-        The paths, `following.stepped`.
-    clear : bool array, shape (stripe, column)
-        Where to listen, see `clear_columns`.
-    power_limits : (float, float)
-        The least of the texture and the most of anything, in units of their usual power.
-
-    Returns
-    -------
+    score, information : float64 arrays, shape (2, column)
+        Sums over the stripes of each wall.
     said : float64 array, shape (stripe, column)
         Score without its mean, times trust.
     weight : float32 array, shape (stripe, column)
         0 … 1.
     """
-    weight, said = np.empty(rows.shape, np.float32), np.empty(rows.shape)
-    _listen(columns, rows, clear, ear.half_px, *ear.for_listening, power_limits, said, weight)
-    return said, weight
+
+    score: FloatArray
+    information: FloatArray
+    said: FloatArray
+    weight: Float32Array
+
+
+def told(
+    ear: Ear, layout: StripeLayout, stretch: Stretch, *, least_support: float, power_limits: tuple[float, float]
+) -> Told:
+    """Return what the stripes say of the present path of both walls.
+
+    Parameters
+    ----------
+    ear : Ear
+        Of at least one stripe.
+    layout : StripeLayout
+    stretch : Stretch
+        In the tone of the ear's model, its picture in the processor's memory.
+    least_support : float
+        See `clear_columns`.
+    power_limits : (float, float)
+        The least of the texture and the most of anything, in units of their usual power.
+    """
+    score, information = np.zeros((2, *stretch.displacement_px.shape))
+    said = np.empty((ear.number.size, score.shape[1]))
+    weight = np.empty(said.shape, np.float32)
+    sight = _in_sight(stretch, layout, ear.half_px, least_support)
+    summed = (ear.wall, ear.trusted_information, score, information)
+    _tell(stretch.columns, stretch.displacement_px, ear.number, sight, ear.for_listening, power_limits, summed, said, weight)  # fmt: skip  # noqa: E501
+    return Told(score, information, said, weight)
+
+
+def told_by(
+    heard: Callable[[FloatArray, BoolArray], tuple[FloatArray, Float32Array]],
+    ear: Ear,
+    layout: StripeLayout,
+    stretch: Stretch,
+    *,
+    least_support: float,
+) -> Told:
+    """Return the same by someone else's hearing, which is given the rows of paths, `following.stepped`, and where they are clear.
+
+    It returns what is said and its weight.
+    """
+    score, information = np.zeros((2, *stretch.displacement_px.shape))
+    rows, clear = clear_columns(stretch, layout, ear.number, half_px=ear.half_px, least_support=least_support)
+    aside = np.empty_like(rows)
+    stepped(rows, aside)
+    said, weight = heard(rows, clear)
+    add_up(said, weight, aside, ear.wall, ear.trusted_information, score, information)
+    return Told(score, information, said, weight)
+
+
+@numba.njit(cache=True, nogil=True)
+def _tell(columns, displacement, number, sight, hearing, limits, summed, said, weight):  # type: ignore[no-untyped-def]
+    """Hear all stripes about the present path, and add up what they say; see `told`."""
+    stripes, needed, picture = sight
+    rows, clear, aside = np.empty(said.shape), np.empty(said.shape, np.bool_), np.empty(said.shape)
+    _clear(displacement, number, stripes, needed, picture, rows, clear)
+    stepped(rows, aside)
+    ear, plan, first_bin = hearing
+    listen(columns, rows, clear, int(needed[0]), ear, plan, first_bin, limits, said, weight)
+    wall, information, score, sum_of_information = summed
+    add_up(said, weight, aside, wall, information, score, sum_of_information)

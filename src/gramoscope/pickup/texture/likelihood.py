@@ -215,9 +215,9 @@ def quiet_power(said: FloatArray, weight: FloatArray) -> tuple[FloatArray, float
     return np.asarray((spectrum @ spectrum.conj().T).real), float(np.sum(weight**2))
 
 
-def quiet_powers(weighted: FloatArray) -> FloatArray:
+def quiet_powers(said: FloatArray, weight: Float32Array) -> FloatArray:
     """Return the power of scores, weighted by what each counts, at frequencies where no sound is: the diagonal of J."""
-    spectrum = _quiet_spectrum(weighted)
+    spectrum = _quiet_spectrum(said * weight)
     return np.asarray((spectrum.real**2 + spectrum.imag**2).sum(axis=1))
 
 

@@ -21,8 +21,8 @@ from gramoscope.disc.formats import Cut
 from gramoscope.errors import require
 from gramoscope.pickup.texture.coarse_path import sign_of
 from gramoscope.pickup.texture.filter_bank import FilterBank
-from gramoscope.pickup.texture.following import channels, follow, stepped
-from gramoscope.pickup.texture.hearing import Ear, add_up, clear_columns, ear_of
+from gramoscope.pickup.texture.following import channels, follow
+from gramoscope.pickup.texture.hearing import Ear, Told, ear_of
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.likelihood import StripeStatistics, quiet_powers
 from gramoscope.pickup.texture.smoothing import smooth
@@ -158,25 +158,32 @@ def evidence(stretch: Stretch, model: Model, rules: Rules, *, judged: bool = Tru
     """Return what all stripes say about the present path of both walls, and whether that surprises, if it is to be judged."""
     ear, seen = model.ear, stretch.in_tone(model.tone)
     columns = seen.columns.shape[0]
-    score, information = np.zeros((2, 2, columns))
     if not ear.number.size:
-        return Evidence(score, information, UNJUDGED)
+        return Evidence(np.zeros((2, columns)), np.zeros((2, columns)), UNJUDGED)
     require(columns <= ear.length, f"a stretch of {columns} columns", f"at most {ear.length}, as the passage taught")
-    rows, clear = clear_columns(seen, model.layout, ear.number, half_px=ear.half_px, least_support=rules.least_support)
-    aside = np.empty_like(rows)
-    stepped(rows, aside)
-    said, weight = seen.device.heard(ear, seen.columns, rows, clear, power_limits=rules.power_limits)
-    add_up(said, weight, aside, ear.wall, ear.trusted_information, score, information)
-    return Evidence(score, information, _surprise(ear, said, weight) if judged else UNJUDGED)
+    told = seen.device.told(ear, model.layout, seen, least_support=rules.least_support, power_limits=rules.power_limits)
+    return Evidence(told.score, told.information, _surprise(ear, told) if judged else UNJUDGED)
 
 
-def _surprise(ear: Ear, said: FloatArray, weight: Float32Array) -> FloatArray:
-    surprise = np.zeros((2, 2))
-    power, columns = quiet_powers(said * weight), np.einsum("sx,sx->s", weight, weight, dtype=np.float64)
-    for i, wall in enumerate(ear.wall):
-        surprise[wall] += power[i], columns[i] * ear.trust[i] ** 2 * ear.score_power[i]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(surprise[:, 0] / surprise[:, 1])
+def _surprise(ear: Ear, told: Told) -> FloatArray:
+    surprise = np.empty(2)
+    power = quiet_powers(told.said, told.weight)
+    _compare(power, told.weight, ear.trust, ear.score_power, ear.wall, surprise)
+    return surprise
+
+
+@numba.njit(cache=True, nogil=True)
+def _compare(power, weight, trust, score_power, wall, surprise):  # type: ignore[no-untyped-def]
+    """Write the power of the scores of each wall over what was learned, NaN of a wall that was not heard."""
+    found, usual = np.zeros(2), np.zeros(2)
+    for i in range(wall.size):
+        columns = 0.0
+        for one in weight[i]:
+            columns += one * one
+        found[wall[i]] += power[i]
+        usual[wall[i]] += columns * trust[i] ** 2 * score_power[i]
+    for side in range(2):
+        surprise[side] = found[side] / usual[side] if usual[side] > 0 else np.nan
 
 
 def step(found: Evidence, cut: Cut, rules: Rules) -> FloatArray:
@@ -186,14 +193,25 @@ def step(found: Evidence, cut: Cut, rules: Rules) -> FloatArray:
     other one, slowly. Where one wall is silent it goes along with the other.
     """
     moved = np.empty(found.score.shape)
-    limits = (rules.smooth_px, rules.step_noise_px, rules.largest_step_px)
-    if cut == "stereo":
-        smooth_px = smoothing_px(found.information, limits)
-        for wall in (INNER, OUTER):
-            steps_of(found.score[wall], found.information[wall], smooth_px, rules.largest_step_px, moved[wall])
-    else:
-        _step_together(found.score, found.information, sign_of(cut), limits, rules.smooth_other_px, moved)
+    _step(found.score, found.information, *_allowed(cut, rules), moved)
     return moved
+
+
+def _allowed(cut: Cut, rules: Rules) -> tuple[bool, FloatArray, tuple[float, float, float], float]:
+    """Whether both walls move together, by which signs, by what steps, and how smoothly against each other."""
+    limits = (rules.smooth_px, rules.step_noise_px, rules.largest_step_px)
+    return cut != "stereo", sign_of(cut), limits, rules.smooth_other_px
+
+
+@numba.njit(cache=True, nogil=True)
+def _step(score, information, together, sign, limits, smooth_other_px, moved):  # type: ignore[no-untyped-def]
+    """Write how far each wall should be moved; see `step`."""
+    if together:
+        _step_together(score, information, sign, limits, smooth_other_px, moved)
+        return
+    smooth_px = smoothing_px(information, limits)
+    for wall in (INNER, OUTER):
+        steps_of(score[wall], information[wall], smooth_px, limits[2], moved[wall])
 
 
 @numba.njit(cache=True, nogil=True)
@@ -253,16 +271,19 @@ def read(stretch: Stretch, models: Sequence[Model], cut: Cut, rules: Rules) -> t
         if seen.tone != model.tone:
             seen = begun.in_tone(model.tone)
         # scores answer less to a path that is far off, and what was missing before is mostly missing still
-        _go_on(step(evidence(seen, model, rules, judged=False), cut, rules), rules.gain, rules.momentum, move, path)
+        found = evidence(seen, model, rules, judged=False)
+        _go_on(found.score, found.information, *_allowed(cut, rules), rules.gain, rules.momentum, move, path)
     return seen, evidence(seen, models[-1], rules)
 
 
 @numba.njit(cache=True, nogil=True)
-def _go_on(step, gain, momentum, move, path):  # type: ignore[no-untyped-def]
+def _go_on(score, information, together, sign, limits, smooth_other_px, gain, momentum, move, path):  # type: ignore
     """Move paths by a step and some of the move before."""
+    asked = np.empty(path.shape)
+    _step(score, information, together, sign, limits, smooth_other_px, asked)
     for wall in range(len(path)):
         for x in range(path.shape[1]):
-            move[wall, x] = gain * step[wall, x] + momentum * move[wall, x]
+            move[wall, x] = gain * asked[wall, x] + momentum * move[wall, x]
             path[wall, x] += move[wall, x]
 
 
