@@ -10,6 +10,7 @@ path near the common one.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numba
 import numpy as np
@@ -296,44 +297,16 @@ class GrooveSearch:
         self, sharp: Float32Array, ridge: Float32Array, layout: StripeLayout, cut: Cut
     ) -> tuple[FloatArray, FloatArray]:
         """Return the lateral and the vertical displacement that suit all stripes, on a grid of `GRID_PX`."""
-        height = ridge.shape[1]
-        reach = {
-            "lateral": (np.inf, self.drift_px),
-            "vertical": (self.drift_px, self.swing_px),
-            "stereo": (self.swing_px, self.swing_px),
-        }[cut]
-        # further than this no stripe is seen
-        low, high = (layout.first_row - layout.rest_row).min(), (layout.last_row - layout.rest_row).max()
-        lateral = _grid(max(low - reach[1], -reach[0]), min(high + reach[1], reach[0]))
-        vertical = _grid(-reach[1], reach[1])
-        used = [cut != "vertical", cut != "lateral"]
-        large = [self.usual_swing_px if use else self.usual_drift_px for use in used]
-        swing = self.swing_cost * ((lateral / large[0]) ** 2 + (vertical[:, None] / large[1]) ** 2)
-        depth = layout.from_bottom_px[:, None] - vertical
-        merged = (depth >= 0) & (depth < MERGED_PX)
-        rest = (
-            np.rint(layout.rest_row).astype(np.int64)[:, None]
-            + wall_sign(layout.wall).astype(np.int64)[:, None] * vertical
-        )
-        first_row = np.where(merged, int(np.rint(layout.middle_row)), rest) + lateral[0]
-        half = np.where(merged, np.maximum(GRID_PX * np.rint(depth / GRID_PX), 2 * GRID_PX), 0).astype(np.int64)
-        halves, looks = np.unique(half, return_inverse=True)
-        coarse = np.zeros((halves.size, GRID_PX, len(ridge), -(-height // GRID_PX)), np.float32)
-        for look, one in enumerate(halves):
-            flanks = (int(one) + FLANK_PX[0], int(one) + FLANK_PX[1])
-            _thin_out(ridges(sharp, half_px=int(one), flank_px=flanks) if one else ridge, coarse[look])
-        on_wall = (merged | (depth > BOTTOM_PX)) & (depth < layout.half_width_px)
-        rows = np.array([np.maximum(np.ceil(layout.first_row), 0), np.minimum(np.floor(layout.last_row), height - 1)])
-        seen = np.where(on_wall[:, :, None], rows.T[:, None], [0, -1]).astype(np.int64)
-        steps = np.array([1 if use else int(len(ridge) > 1) for use in used])
-        # what the cut does not use changes slowly: a step of one grid point costs as much as a cell without its stripes
-        costs = np.array([self.step_cost * GRID_PX if use else 1.0 for use in used])
-        absent = np.float32(self.absent)
-        steps, costs = steps[::-1].copy(), costs[::-1].copy()
+        cells, height = ridge.shape
+        grid = _grid_of(self, layout, cut, height, cells > 1)
+        coarse = np.zeros((len(grid.halves), GRID_PX, cells, -(-height // GRID_PX)), np.float32)
+        for look, half in enumerate(grid.halves):
+            flanks = (half + FLANK_PX[0], half + FLANK_PX[1])
+            _thin_out(ridges(sharp, half_px=half, flank_px=flanks) if half else ridge, coarse[look])
         path, _ = _common_path(
-            coarse, swing.astype(np.float32), looks.reshape(half.shape), first_row, seen, absent, steps, costs
+            coarse, grid.swing, grid.looks, grid.first_row, grid.seen_rows, np.float32(self.absent), *grid.steps
         )
-        return lateral[path[1]].astype(np.float64), vertical[path[0]].astype(np.float64)
+        return grid.lateral_px[path[1]], grid.vertical_px[path[0]]
 
     def _own_paths(
         self, ridge: Float32Array, layout: StripeLayout, common: FloatArray
@@ -345,6 +318,75 @@ class GrooveSearch:
         limits = np.array([layout.first_row, layout.last_row])
         _own(ridge, layout.rest_row, layout.wall, limits, alone, int(self.wall_reach_px), self.step_cost, path, support)
         return path, support
+
+
+@dataclass(frozen=True, eq=False)
+class _Grid:
+    """What the common search goes through.
+
+    Attributes
+    ----------
+    lateral_px, vertical_px : float64 arrays, shape (lateral,), (vertical,)
+        Displacements.
+    swing : float32 array, shape (vertical, lateral)
+        What they cost.
+    halves : tuple of int
+        Half widths of the ridges that are looked at; 0 for those of single stripes.
+    looks, first_row, seen_rows : int64 arrays, shape (stripe, vertical), the last one (stripe, vertical, 2)
+        See `_common_path`.
+    steps : (int64 array, float64 array), shape (2,)
+        Largest steps from cell to cell, vertical and lateral, and what they cost.
+    """
+
+    lateral_px: FloatArray
+    vertical_px: FloatArray
+    swing: Float32Array
+    halves: tuple[int, ...]
+    looks: IntArray
+    first_row: IntArray
+    seen_rows: IntArray
+    steps: tuple[IntArray, FloatArray]
+
+
+@lru_cache(maxsize=8)
+def _grid_of(search: GrooveSearch, layout: StripeLayout, cut: Cut, height: int, several_cells: bool) -> _Grid:
+    """Return the grid of a search, the same for all stretches of a passage."""
+    reach = {
+        "lateral": (np.inf, search.drift_px),
+        "vertical": (search.drift_px, search.swing_px),
+        "stereo": (search.swing_px, search.swing_px),
+    }[cut]
+    # further than this no stripe is seen
+    low, high = (layout.first_row - layout.rest_row).min(), (layout.last_row - layout.rest_row).max()
+    lateral = _grid(max(low - reach[1], -reach[0]), min(high + reach[1], reach[0]))
+    vertical = _grid(-reach[1], reach[1])
+    used = [cut != "vertical", cut != "lateral"]
+    large = [search.usual_swing_px if use else search.usual_drift_px for use in used]
+    swing = search.swing_cost * ((lateral / large[0]) ** 2 + (vertical[:, None] / large[1]) ** 2)
+    depth = layout.from_bottom_px[:, None] - vertical
+    merged = (depth >= 0) & (depth < MERGED_PX)
+    rest = (
+        np.rint(layout.rest_row).astype(np.int64)[:, None] + wall_sign(layout.wall).astype(np.int64)[:, None] * vertical
+    )
+    first_row = np.where(merged, int(np.rint(layout.middle_row)), rest) + lateral[0]
+    half = np.where(merged, np.maximum(GRID_PX * np.rint(depth / GRID_PX), 2 * GRID_PX), 0).astype(np.int64)
+    halves, looks = np.unique(half, return_inverse=True)
+    on_wall = (merged | (depth > BOTTOM_PX)) & (depth < layout.half_width_px)
+    rows = np.array([np.maximum(np.ceil(layout.first_row), 0), np.minimum(np.floor(layout.last_row), height - 1)])
+    seen = np.where(on_wall[:, :, None], rows.T[:, None], [0, -1]).astype(np.int64)
+    steps = np.array([1 if use else int(several_cells) for use in used])
+    # what the cut does not use changes slowly: a step of one grid point costs as much as a cell without its stripes
+    costs = np.array([search.step_cost * GRID_PX if use else 1.0 for use in used])
+    return _Grid(
+        lateral.astype(np.float64),
+        vertical.astype(np.float64),
+        swing.astype(np.float32),
+        tuple(halves.tolist()),
+        looks.reshape(half.shape),
+        first_row,
+        seen,
+        (steps[::-1].copy(), costs[::-1].copy()),
+    )
 
 
 @numba.njit(cache=True, nogil=True)

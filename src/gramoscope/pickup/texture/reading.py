@@ -179,7 +179,7 @@ def _compare(power, weight, trust, score_power, wall, surprise):  # type: ignore
     for i in range(wall.size):
         columns = 0.0
         for one in weight[i]:
-            columns += one * one
+            columns += np.float64(one) * one
         found[wall[i]] += power[i]
         usual[wall[i]] += columns * trust[i] ** 2 * score_power[i]
     for side in range(2):

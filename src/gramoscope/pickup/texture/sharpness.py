@@ -9,6 +9,7 @@ any stripe, so the root is cut off.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numba
 import numpy as np
@@ -158,22 +159,35 @@ def sharpness(images: ImageArray, shift_px: FloatArray, *, ceiling: float = CEIL
 def whole_pixels(frame_width: int, shift_px: FloatArray) -> tuple[IntArray, IntArray, Float32Array]:
     """Return which frames are looked at, where each begins, by whole pixels, and one over how many lie in each column."""
     width = overlay_width(frame_width, shift_px)
-    frames = np.unique(np.rint(np.linspace(0, shift_px.size - 1, min(SOME_FRAMES, shift_px.size))).astype(np.int64))
-    offset = np.minimum(np.rint(shift_px).astype(np.int64), width - frame_width)[frames]
-    counts = np.zeros(width)
-    for first in offset:
-        counts[first : first + frame_width] += 1
-    return frames, offset, (1 / np.maximum(counts, 1)).astype(np.float32)
+    frames = _some_of(shift_px.size)
+    offset, share = np.empty(frames.size, np.int64), np.empty(width, np.float32)
+    _lay_whole(shift_px, frames, frame_width, offset, share)
+    return frames, offset, share
+
+
+@lru_cache(maxsize=64)
+def _some_of(frames: int) -> IntArray:
+    """Return the numbers of frames that are looked at, of so many."""
+    return np.unique(np.rint(np.linspace(0, frames - 1, min(SOME_FRAMES, frames))).astype(np.int64))
+
+
+@numba.njit(cache=True, nogil=True)
+def _lay_whole(shift_px, frames, frame_width, offset, share):  # type: ignore[no-untyped-def]
+    """Write where frames begin, and one over how many lie in each column."""
+    width = share.size
+    share[:] = 0
+    for i, frame in enumerate(frames):
+        offset[i] = min(int(np.rint(shift_px[frame])), width - frame_width)
+        for x in range(offset[i], offset[i] + frame_width):
+            share[x] += 1
+    for x in range(width):
+        share[x] = 1 / max(np.float64(share[x]), 1.0)
 
 
 def sharpness_of(energy: Float32Array, *, ceiling: float = CEILING) -> Sharpness:
     """Return how sharp cells of such energies are, see `sharpness`."""
     sharp = np.empty_like(energy)
-    _smooth(energy, sharp)
-    # a row is quiet all along the stretch, or it is not
-    some = np.sort(sharp[::EVERY], axis=0)
-    typical = _relate(sharp, 0.5 * (some[(len(some) - 1) // 2] + some[len(some) // 2]), np.float32(ceiling))
-    return Sharpness(sharp, float(typical))
+    return Sharpness(sharp, float(_sharpen(energy, np.float32(ceiling), sharp)))
 
 
 QUIETEST = 0.1
@@ -200,6 +214,38 @@ def _smooth(energy, out):  # type: ignore[no-untyped-def]
         before, after = max(cell - 1, 0), min(cell + 1, last)
         far_before, far_after = max(cell - 2, 0), min(cell + 2, last)
         _smooth_cell(energy[far_before], energy[before], energy[cell], energy[after], energy[far_after], out[cell])
+
+
+@numba.njit(cache=True, nogil=True)
+def _sharpen(energy, ceiling, sharp):  # type: ignore[no-untyped-def]
+    """Write how sharp cells of such energies are, and return what is typical; see `sharpness`."""
+    _smooth(energy, sharp)
+    cells, height = sharp.shape
+    looked_at = (cells + EVERY - 1) // EVERY
+    # a row is quiet all along the stretch, or it is not
+    some, usual = np.empty((looked_at, height), np.float32), np.empty(height, np.float32)
+    for k in range(looked_at):
+        some[k] = sharp[k * EVERY]
+    # neighbours change places until all rows are sorted, so many rows at a time as a processor's vector holds
+    for turn in range(looked_at):
+        for k in range(turn % 2, looked_at - 1, 2):
+            _exchange(some[k], some[k + 1])
+    _mean_of_two(some[(looked_at - 1) // 2], some[looked_at // 2], usual)
+    return _relate(sharp, usual, ceiling)
+
+
+@numba.njit(cache=True, nogil=True)
+def _exchange(one, other):  # type: ignore[no-untyped-def]
+    """Write the smaller ones to the first, the larger ones to the second."""
+    for row in range(one.size):
+        here, there = one[row], other[row]
+        one[row], other[row] = min(here, there), max(here, there)
+
+
+@numba.njit(cache=True, nogil=True)
+def _mean_of_two(one, other, out):  # type: ignore[no-untyped-def]
+    for row in range(out.size):
+        out[row] = np.float32(0.5) * (one[row] + other[row])
 
 
 @numba.njit(cache=True, nogil=True)
