@@ -21,7 +21,7 @@ from gramoscope.pickup.texture.lane_transform import PAIR, fold, let_through, pl
 from gramoscope.pickup.texture.layout import StripeLayout, see_stripe
 from gramoscope.pickup.texture.likelihood import (
     LOUDNESS_BELL,
-    TAPER,
+    TAPERED,
     TEMPER,
     TEXTURE_PX,
     StripeStatistics,
@@ -291,7 +291,7 @@ def _draw(columns, row, clear, half_px, half_taps, mixtures, usual, limits, room
     _whiten(wide, width, half_taps, usual, white, power)
     within(power, TEXTURE_PX // 2, limits[0], limits[1], valid)
     valid &= clear
-    soften(valid, TAPER, weight)
+    soften(valid, TAPERED, weight)
     for x in range(width):
         share = weight[x]
         for c in range(LANES):
@@ -436,10 +436,7 @@ def told_by(
     *,
     least_support: float,
 ) -> Told:
-    """Return the same by someone else's hearing, which is given the rows of paths, `following.stepped`, and where they are clear.
-
-    It returns what is said and its weight.
-    """
+    """Return the same by someone else's hearing: it returns what is said of stepped paths, and its weight."""
     score, information = np.zeros((2, *stretch.displacement_px.shape))
     rows, clear = clear_columns(stretch, layout, ear.number, half_px=ear.half_px, least_support=least_support)
     aside = np.empty_like(rows)

@@ -111,7 +111,7 @@ def _add_scaled(w, before, after, out):  # type: ignore[no-untyped-def]
         out[x] += w * (before[x] + after[x])
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def temper(score, loudness, half_bell, least, u):  # type: ignore[no-untyped-def]
     """Write scores over the local loudness and the least that it counts as."""
     width, reach = score.size, half_bell.size - 1
@@ -153,46 +153,38 @@ def best_shares(answers: FloatArray, powers: FloatArray) -> FloatArray:
 def softened(valid: BoolArray) -> Float32Array:
     """Return a weight that is 1 well inside the valid columns and falls softly to 0 before their ends."""
     weight = np.empty(valid.size, np.float32)
-    soften(valid, TAPER, weight)
+    soften(valid, TAPERED, weight)
     return weight
 
 
 TAPER = np.hanning(2 * TAPER_PX + 3)[1:-1]
 TAPER /= TAPER.sum()
+TAPERED = np.append(0.0, np.cumsum(TAPER))
+"""By how much a weight has risen after so many columns of the way up."""
 
 
 @numba.njit(cache=True, nogil=True)
-def _erode(valid, reach, core):  # type: ignore[no-untyped-def]
-    """Take away what is nearer than `reach` to something that is not valid; beyond the ends all is valid."""
-    away = reach
-    for x in range(valid.size):
-        away = away + 1 if valid[x] else 0
-        core[x] = away > reach
-    away = reach
-    for x in range(valid.size - 1, -1, -1):
-        away = away + 1 if valid[x] else 0
-        core[x] &= away > reach
-
-
-@numba.njit(cache=True, nogil=True)
-def soften(valid, bell, weight):  # type: ignore[no-untyped-def]
-    """Erode by half the bell and smooth by it, the ends being held; most columns are far from any edge."""
-    width, reach = valid.size, bell.size // 2
-    core = np.empty(width, np.bool_)
-    _erode(valid, reach, core)
-    inside = 0
-    for k in range(-reach, reach + 1):
-        inside += core[min(max(k, 0), width - 1)]
-    for x in range(width):
-        if inside == bell.size or inside == 0:
-            weight[x] = inside > 0
-        else:
-            total = 0.0
-            for k in range(bell.size):
-                total += bell[k] * core[min(max(x + k - reach, 0), width - 1)]
-            weight[x] = total
-        inside += core[min(x + 1 + reach, width - 1)]
-        inside -= core[max(x - reach, 0)]
+def soften(valid, tapered, weight):  # type: ignore[no-untyped-def]
+    """Erode by half the way up, and go that way about the ends of what is left; beyond the ends of all everything is valid."""
+    width, reach = valid.size, tapered.size // 2 - 1
+    weight[:] = 0.0
+    begin = 0
+    while begin < width:
+        if not valid[begin]:
+            begin += 1
+            continue
+        end = begin + 1
+        while end < width and valid[end]:
+            end += 1
+        low = begin + reach if begin > 0 else -reach
+        high = end - reach if end < width else width + reach
+        if low < high:
+            weight[max(low + reach, 0) : max(high - reach, 0)] = 1.0
+            for x in range(max(low - reach, 0), min(low + reach, width)):
+                weight[x] += tapered[min(max(high - x + reach, 0), 2 * reach + 1)] - tapered[low - x + reach]
+            for x in range(max(high - reach, low + reach, 0), min(high + reach, width)):
+                weight[x] += tapered[high - x + reach]
+        begin = end
 
 
 def quiet_power(said: FloatArray, weight: FloatArray) -> tuple[FloatArray, float]:

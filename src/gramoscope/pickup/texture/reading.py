@@ -203,7 +203,7 @@ def _allowed(cut: Cut, rules: Rules) -> tuple[bool, FloatArray, tuple[float, flo
     return cut != "stereo", sign_of(cut), limits, rules.smooth_other_px
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _step(score, information, together, sign, limits, smooth_other_px, moved):  # type: ignore[no-untyped-def]
     """Write how far each wall should be moved; see `step`."""
     if together:
@@ -214,7 +214,7 @@ def _step(score, information, together, sign, limits, smooth_other_px, moved):  
         steps_of(score[wall], information[wall], smooth_px, limits[2], moved[wall])
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def smoothing_px(information, limits):  # type: ignore[no-untyped-def]
     """Return the σ of a Gaussian after which steps have the noise that the rules allow: 1/(2√π σ I) = noise²."""
     least, noise, _ = limits
@@ -228,7 +228,7 @@ def smoothing_px(information, limits):  # type: ignore[no-untyped-def]
     return min(max(wanted, least), 2 * least)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def steps_of(score, information, smooth_px, largest, out):  # type: ignore[no-untyped-def]
     """Write smoothed score over smoothed information, none larger than allowed; 0 where nothing is known at all."""
     most = information.max()
@@ -242,7 +242,7 @@ def steps_of(score, information, smooth_px, largest, out):  # type: ignore[no-un
         out[x] = min(max(out[x] / max(bottom[x], 0.05 * most), -largest), largest)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _step_together(score, information, sign, limits, smooth_other_px, moved):  # type: ignore[no-untyped-def]
     width = score.shape[1]
     inner, outer = information[INNER], information[OUTER]
@@ -276,7 +276,7 @@ def read(stretch: Stretch, models: Sequence[Model], cut: Cut, rules: Rules) -> t
     return seen, evidence(seen, models[-1], rules)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _go_on(score, information, together, sign, limits, smooth_other_px, gain, momentum, move, path):  # type: ignore
     """Move paths by a step and some of the move before."""
     asked = np.empty(path.shape)
