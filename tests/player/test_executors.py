@@ -47,6 +47,9 @@ class _Lazy:
     most: int = 0
     tasks: list[Task] = field(default_factory=list)
 
+    def get_ready(self) -> None:
+        """Nothing."""
+
     @contextmanager
     def crew(self, reader: Reader) -> Iterator[Any]:
         self._reader = reader

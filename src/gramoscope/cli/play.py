@@ -126,7 +126,7 @@ def play(
         checked in CUDA's simulator, not on a card). Both agree to rounding.
     executor
         Who reads: threads, processes, or the workers of Dask (needs `pip install "gramoscope[cluster]"`), on this machine
-        unless --scheduler says where; auto takes processes for 2048 groups or more, which they read sooner than threads. The
+        unless --scheduler says where; auto takes processes for 1024 groups or more, which they read sooner than threads. The
         result does not depend on it.
     scheduler
         Address of a Dask scheduler that runs already, such as tcp://10.0.0.1:8786, whatever started it. Its workers must see

@@ -46,6 +46,9 @@ class Cluster:
     def __post_init__(self) -> None:
         require(self.workers >= 1, f"{self.workers} workers", "at least one")
 
+    def get_ready(self) -> None:
+        """Nothing: somebody may still start the scheduler."""
+
     @contextmanager
     def crew(self, reader: Reader) -> Iterator[Crew]:
         """Give the workers of the cluster; those that join later are used too.

@@ -12,12 +12,15 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from multiprocessing import forkserver
 from multiprocessing.connection import Connection
 from typing import Any, Protocol
 
 from gramoscope.errors import require
 from gramoscope.player.pieces import Reader, Task, read_elsewhere
 
+_METHOD = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+"""How processes start. None is forked from this one, which has threads."""
 AHEAD = 2
 """So many pieces for each worker are under way or done before they are used."""
 
@@ -63,6 +66,10 @@ class Crew(Protocol):
 class Executor(Protocol):
     """A way to have pieces read."""
 
+    def get_ready(self) -> None:
+        """Begin, without waiting for it, what takes a while before there are workers."""
+        ...
+
     def crew(self, reader: Reader) -> AbstractContextManager[Crew]:
         """Give workers while the block runs; when it ends, nothing is being read any more."""
         ...
@@ -96,6 +103,9 @@ class Threads:
     def __post_init__(self) -> None:
         require(self.workers >= 1, f"{self.workers} workers", "at least one")
 
+    def get_ready(self) -> None:
+        """Threads are there at once."""
+
     @contextmanager
     def crew(self, reader: Reader) -> Iterator[Crew]:
         """Give threads."""
@@ -121,6 +131,12 @@ class Processes:
     def __post_init__(self) -> None:
         require(self.workers >= 1, f"{self.workers} workers", "at least one")
 
+    def get_ready(self) -> None:
+        """Where the system can fork, start the process that all others come from, which loads all that they need."""
+        if _METHOD == "forkserver":
+            multiprocessing.get_context(_METHOD).set_forkserver_preload(["gramoscope.player.pieces"])
+            forkserver.ensure_running()
+
     @contextmanager
     def crew(self, reader: Reader) -> Iterator[Crew]:
         """Give processes."""
@@ -143,7 +159,7 @@ class Processes:
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-MANY_GROUPS = 2048
+MANY_GROUPS = 1024
 """So many are read sooner by processes, which take a few seconds to start, than by threads, which wait for each other's turn
 with the interpreter."""
 
@@ -178,7 +194,7 @@ class _Hand:
             if self._closed:
                 raise EOFError
             if self._pipe is None:
-                context = multiprocessing.get_context("spawn")
+                context: Any = multiprocessing.get_context(_METHOD)
                 self._pipe, theirs = context.Pipe()
                 self._process = context.Process(target=_hand_works, args=(theirs,), daemon=True, name="pickup")
                 self._process.start()

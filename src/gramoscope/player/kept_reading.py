@@ -241,9 +241,11 @@ def kept_reading_of(
         remove_left_over(folder)
         useless = False
         try:
+            executor = work.executor or Threads(workers)
+            executor.get_ready()
             store = _store(root, capture, recipe, device, work)
             pickup, store = _learned(store, capture, recipe, device, work, learn)
-            yield KeptReading(Reader(capture, pickup, store), work, work.executor or Threads(workers))
+            yield KeptReading(Reader(capture, pickup, store), work, executor)
             useless = not work.keep_reading
         except CaptureError:
             useless = True  # another capture was meant, or there is nothing to hear
