@@ -18,6 +18,7 @@ from gramoscope.camera.film_line import film_line
 from gramoscope.conventions import BoolArray, Float32Array, FloatArray, IntArray
 from gramoscope.pickup.device import Kept
 from gramoscope.pickup.film_lanes import PIXELS, sum_lines, sum_phases, write_as_columns
+from gramoscope.pickup.lane_writer import LANES
 from gramoscope.pickup.picture_room import picture_room
 from gramoscope.pickup.registration import cubic_taps, placement
 from gramoscope.signal_path import ImageArray
@@ -419,18 +420,34 @@ def _smooth(wide, w, out):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _slope_along(columns, slope):  # type: ignore[no-untyped-def]
+def _slope_of(columns, x, wide, out):  # type: ignore[no-untyped-def]
+    """Write the slope in one column."""
     width, height = columns.shape
     reach = GAUSSIAN_REACH
-    wide, smooth = np.empty(height + 2 * reach, np.float32), np.empty(height, np.float32)
-    for x in range(width):
-        wide[:] = np.float32(0)
-        here = wide[reach : reach + height]
-        for k in range(1, reach + 1):
-            _add_difference(_SLOPE[k - 1], columns[min(x + k, width - 1)], columns[max(x - k, 0)], here)
-        wide[:reach], wide[reach + height :] = here[0], here[-1]
-        _smooth(wide, _BELL, smooth)
-        slope[:, x] = smooth
+    wide[:] = np.float32(0)
+    here = wide[reach : reach + height]
+    for k in range(1, reach + 1):
+        _add_difference(_SLOPE[k - 1], columns[min(x + k, width - 1)], columns[max(x - k, 0)], here)
+    wide[:reach], wide[reach + height :] = here[0], here[-1]
+    _smooth(wide, _BELL, out)
+
+
+@numba.njit(cache=True, nogil=True)
+def _slope_along(columns, slope):  # type: ignore[no-untyped-def]
+    width, height = columns.shape
+    wide, some = np.empty(height + 2 * GAUSSIAN_REACH, np.float32), np.empty((LANES, height), np.float32)
+    if width < LANES or height < LANES:
+        for x in range(width):
+            _slope_of(columns, x, wide, some[0])
+            slope[:, x] = some[0]
+        return
+    once, sums, line = np.ones(height, np.float32), some.reshape(some.size), slope.reshape(slope.size)
+    for first in range(0, width, LANES):
+        # the last ones end where the picture does
+        begin = min(first, width - LANES)
+        for k in range(LANES):
+            _slope_of(columns, begin + k, wide, some[k])
+        write_as_columns(sums, 0, height, once, 0, height, line, begin, width)
 
 
 def slope_along(columns: Float32Array) -> Float32Array:
