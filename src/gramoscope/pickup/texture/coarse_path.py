@@ -12,7 +12,7 @@ import numpy as np
 
 from gramoscope.conventions import INNER, OUTER, BoolArray, FloatArray, IntArray
 from gramoscope.disc.formats import Cut
-from gramoscope.pickup.texture.smoothing import blur, smooth
+from gramoscope.pickup.texture.smoothing import blur, smooth_both
 
 MOST_PARTED_PX = 7.0
 """Further than this from their usual distance, in rows, walls are not: one of the paths has gone astray."""
@@ -189,8 +189,7 @@ def _settle(displacement, support, sign, smooth_px, path):  # type: ignore[no-un
         both[x] = inner * outer / (inner + outer)
         apart[x] = both[x] * (sign[OUTER] * displacement[OUTER, x] - sign[INNER] * displacement[INNER, x]) / 2
     weight, half = np.empty(width), np.empty(width)
-    smooth(both, smooth_px, weight)
-    smooth(apart, smooth_px, half)
+    smooth_both(both, apart, smooth_px, weight, half)
     for x in range(width):
         inner, outer = support[INNER, x] ** 2 + 1e-4, support[OUTER, x] ** 2 + 1e-4
         aside = half[x] / weight[x]

@@ -25,7 +25,7 @@ from gramoscope.pickup.texture.following import channels, follow
 from gramoscope.pickup.texture.hearing import Ear, Told, ear_of
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.likelihood import StripeStatistics, quiet_powers
-from gramoscope.pickup.texture.smoothing import smooth
+from gramoscope.pickup.texture.smoothing import smooth_both
 from gramoscope.pickup.texture.spectrum import Band, filtered
 from gramoscope.pickup.texture.stretch import Stretch
 from gramoscope.pickup.texture.tone import Tone
@@ -236,10 +236,10 @@ def steps_of(score, information, smooth_px, largest, out):  # type: ignore[no-un
         out[:] = 0.0
         return
     bottom = np.empty_like(information)
-    smooth(score, smooth_px, out)
-    smooth(information, smooth_px, bottom)
+    smooth_both(score, information, smooth_px, out, bottom)
+    least = 0.05 * most
     for x in range(out.size):
-        out[x] = min(max(out[x] / max(bottom[x], 0.05 * most), -largest), largest)
+        out[x] = min(max(out[x] / max(bottom[x], least), -largest), largest)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -247,13 +247,15 @@ def _step_together(score, information, sign, limits, smooth_other_px, moved):  #
     width = score.shape[1]
     inner, outer = information[INNER], information[OUTER]
     total, said = np.empty(width), np.empty(width)
-    both, against = np.zeros(width), np.zeros(width)
+    both, against = np.empty(width), np.empty(width)
     for x in range(width):
         one, other = sign[INNER] * score[INNER, x], sign[OUTER] * score[OUTER, x]
         total[x], said[x] = inner[x] + outer[x], one + other
-        if inner[x] > 0 and outer[x] > 0:
-            both[x] = inner[x] * outer[x] / total[x]
-            against[x] = both[x] * (other / outer[x] - one / inner[x]) / 2
+        # without a branch, which would take them one by one
+        known = (inner[x] > 0) & (outer[x] > 0)
+        together = inner[x] * outer[x] / total[x]
+        apart = together * (other / outer[x] - one / inner[x]) / 2
+        both[x], against[x] = together if known else 0.0, apart if known else 0.0
     common, apart = np.empty(width), np.empty(width)
     steps_of(said, total, smoothing_px(total, limits), limits[2], common)
     steps_of(against, both, smooth_other_px, limits[2], apart)

@@ -50,6 +50,44 @@ def smooth(values, sigma, out):  # type: ignore[no-untyped-def]
     _running_mean(between, third, out)
 
 
+@numba.njit(cache=True, nogil=True)
+def _running_means(one, other, half, out, out_other):  # type: ignore[no-untyped-def]
+    """Of two rows: a sum waits for the sum before it, but not for the other row's."""
+    width = one.size
+    total, total_other = (half + 1) * one[0], (half + 1) * other[0]
+    for x in range(1, half + 1):
+        total += one[min(x, width - 1)]
+        total_other += other[min(x, width - 1)]
+    share = 1 / (2 * half + 1)
+    begin = min(half, width)
+    end = max(width - half - 1, begin)
+    for x in range(begin):
+        out[x], out_other[x] = total * share, total_other * share
+        enters = min(x + half + 1, width - 1)
+        total += one[enters] - one[0]
+        total_other += other[enters] - other[0]
+    for x in range(np.uint64(begin), np.uint64(end)):
+        out[x], out_other[x] = total * share, total_other * share
+        enters, leaves = x + np.uint64(half + 1), x - np.uint64(half)
+        total += one[enters] - one[leaves]
+        total_other += other[enters] - other[leaves]
+    for x in range(end, width):
+        out[x], out_other[x] = total * share, total_other * share
+        leaves = max(x - half, 0)
+        total += one[width - 1] - one[leaves]
+        total_other += other[width - 1] - other[leaves]
+
+
+@numba.njit(cache=True, nogil=True)
+def smooth_both(one, other, sigma, out, out_other):  # type: ignore[no-untyped-def]
+    """Write two rows as `smooth` does, in little more time than one."""
+    first, second, third = half_widths(sigma)
+    between, between_other = np.empty_like(one), np.empty_like(other)
+    _running_means(one, other, first, out, out_other)
+    _running_means(out, out_other, second, between, between_other)
+    _running_means(between, between_other, third, out, out_other)
+
+
 def half_bell(sigma: float) -> FloatArray:
     """Return the taps of a Gaussian of that standard deviation, to four times as far, from its middle on."""
     reach = int(4 * sigma + 0.5)
