@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import threading
 import weakref
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -20,9 +21,18 @@ LINE = 16
 """Numbers of single precision in a cache line."""
 
 
+@dataclass(eq=False)
+class _Room:
+    """Memory of some size, where its first cache line begins, and the array by which it was lent."""
+
+    memory: Float32Array
+    begin: int
+    lent: weakref.ref[npt.NDArray[np.float32]]
+
+
 class _Kept(threading.local):
     def __init__(self) -> None:
-        self.rooms: list[tuple[Float32Array, weakref.ref[npt.NDArray[np.float32]]]] = []
+        self.rooms: list[_Room] = []
 
 
 _kept = _Kept()
@@ -33,17 +43,23 @@ def picture_room(columns: int, rows: int) -> Float32Array:
 
     The room is kept for the next picture of this thread as soon as there is neither this array nor a view of it any more.
     """
-    size = columns * rows + LINE
-    _kept.rooms = [
-        (memory, lent) for memory, lent in _kept.rooms if lent() is not None or size <= memory.size <= 2 * size
-    ]
-    memory = next((memory for memory, lent in _kept.rooms if lent() is None), None)
-    _kept.rooms = [(other, lent) for other, lent in _kept.rooms if other is not memory]
-    if memory is None:
-        memory = np.empty(size, np.float32)
+    needed = columns * rows
+    room = _free_room(needed + LINE)
     # views of an array that lies in no other array refer to that array, and not to the memory
-    room = np.frombuffer(memory.data, np.float32)
+    lent = np.frombuffer(room.memory.data, np.float32)
+    room.lent = weakref.ref(lent)
+    return lent[room.begin : room.begin + needed].reshape(columns, rows)
+
+
+def _free_room(size: int) -> _Room:
+    """Return a room that nobody looks at, of such a size; what is too small or far too large is given up."""
+    for room in _kept.rooms:
+        if room.lent() is None:
+            if size <= room.memory.size <= 2 * size:
+                return room
+            _kept.rooms = [other for other in _kept.rooms if other is not room]
+    memory = np.empty(size, np.float32)
+    room = _Room(memory, -memory.ctypes.data // memory.itemsize % LINE, weakref.ref(memory))
     if len(_kept.rooms) < MOST_KEPT:
-        _kept.rooms.append((memory, weakref.ref(room)))
-    begin = -room.ctypes.data // room.itemsize % LINE
-    return room[begin : begin + columns * rows].reshape(columns, rows)
+        _kept.rooms = [*_kept.rooms, room]
+    return room

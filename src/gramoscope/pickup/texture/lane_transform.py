@@ -51,6 +51,7 @@ class Plan:
     turn: Float32Array
 
 
+@lru_cache(maxsize=64)
 def fast_length(least: int) -> int:
     """Return an even length, at least so much and not much more, that is quickest to transform: with few stages."""
     half = -(-max(least, 2) // 2)
@@ -143,3 +144,17 @@ def fold(bins, turn, z):  # type: ignore[no-untyped-def]
     for k in range(m):
         fold_bin(bins, k * PAIR, (m - k) * PAIR, turns, 2 * k, z, k * PAIR)
     z *= np.float32(0.5 / m)
+
+
+@numba.njit(cache=True, nogil=True)
+def power_between(z, turn, band, lane):  # type: ignore[no-untyped-def]
+    """Return the mean of |X_k|² over the bins of a band, from … to, of one of sixteen real rows that `transform` made z of."""
+    m, total = z.size // PAIR, 0.0
+    for k in range(band[0], band[1]):
+        here, there = k % m * PAIR + lane, (m - k) % m * PAIR + lane
+        even, even_imaginary = z[here] + z[there], z[here + LANES] - z[there + LANES]
+        odd, odd_imaginary = z[here + LANES] + z[there + LANES], z[there] - z[here]
+        real = even + turn[k, 0] * odd + turn[k, 1] * odd_imaginary
+        imaginary = even_imaginary + turn[k, 0] * odd_imaginary - turn[k, 1] * odd
+        total += 0.25 * (np.float64(real) * real + np.float64(imaginary) * imaginary)
+    return total / (band[1] - band[0])

@@ -207,12 +207,6 @@ def quiet_power(said: FloatArray, weight: FloatArray) -> tuple[FloatArray, float
     return np.asarray((spectrum @ spectrum.conj().T).real), float(np.sum(weight**2))
 
 
-def quiet_powers(said: FloatArray, weight: Float32Array) -> FloatArray:
-    """Return the power of scores, weighted by what each counts, at frequencies where no sound is: the diagonal of J."""
-    spectrum = _quiet_spectrum(said * weight)
-    return np.asarray((spectrum.real**2 + spectrum.imag**2).sum(axis=1))
-
-
 def _quiet_spectrum(weighted: FloatArray) -> npt.NDArray[np.complex128]:
     """Return the spectra of rows where no sound is, of squares that add up to their mean power there."""
     length = fft.next_fast_len(2 * weighted.shape[1], real=True)

@@ -19,12 +19,14 @@ import numpy as np
 from gramoscope.conventions import INNER, OUTER, Float32Array, FloatArray
 from gramoscope.disc.formats import Cut
 from gramoscope.errors import require
+from gramoscope.pickup.lane_writer import LANES
 from gramoscope.pickup.texture.coarse_path import sign_of
 from gramoscope.pickup.texture.filter_bank import FilterBank
 from gramoscope.pickup.texture.following import channels, follow
 from gramoscope.pickup.texture.hearing import Ear, Told, ear_of
+from gramoscope.pickup.texture.lane_transform import PAIR, fast_length, plan_for, power_between, transform
 from gramoscope.pickup.texture.layout import StripeLayout
-from gramoscope.pickup.texture.likelihood import StripeStatistics, quiet_powers
+from gramoscope.pickup.texture.likelihood import QUIET_BAND, StripeStatistics
 from gramoscope.pickup.texture.smoothing import smooth_both
 from gramoscope.pickup.texture.spectrum import Band, filtered
 from gramoscope.pickup.texture.stretch import Stretch
@@ -166,22 +168,36 @@ def evidence(stretch: Stretch, model: Model, rules: Rules, *, judged: bool = Tru
 
 
 def _surprise(ear: Ear, told: Told) -> FloatArray:
+    plan = plan_for(fast_length(2 * told.said.shape[1]))
+    low, high = (int(np.ceil(f * plan.length)) for f in QUIET_BAND)
     surprise = np.empty(2)
-    power = quiet_powers(told.said, told.weight)
-    _compare(power, told.weight, ear.trust, ear.score_power, ear.wall, surprise)
+    _compare(told.said, told.weight, (plan.radix, plan.twiddle, plan.turn), (low, high), (ear.wall, ear.trust, ear.score_power), surprise)  # fmt: skip  # noqa: E501
     return surprise
 
 
 @numba.njit(cache=True, nogil=True)
-def _compare(power, weight, trust, score_power, wall, surprise):  # type: ignore[no-untyped-def]
-    """Write the power of the scores of each wall over what was learned, NaN of a wall that was not heard."""
+def _compare(said, weight, plan, band, learned, surprise):  # type: ignore[no-untyped-def]
+    """Write the power of the scores of each wall where no sound is over what was learned, NaN of a wall that was not heard."""
+    radix, twiddle, turn = plan
+    wall, trust, score_power = learned
+    m = len(turn) - 1
+    lanes, one, other = (
+        np.zeros((2 * m, LANES), np.float32),
+        np.empty(m * PAIR, np.float32),
+        np.empty(m * PAIR, np.float32),
+    )
     found, usual = np.zeros(2), np.zeros(2)
-    for i in range(wall.size):
-        columns = 0.0
-        for one in weight[i]:
-            columns += np.float64(one) * one
-        found[wall[i]] += power[i]
-        usual[wall[i]] += columns * trust[i] ** 2 * score_power[i]
+    for first in range(0, wall.size, LANES):
+        some = range(first, min(first + LANES, wall.size))
+        for i in some:
+            columns = 0.0
+            for x in range(said.shape[1]):
+                lanes[x, i - first] = said[i, x] * weight[i, x]
+                columns += np.float64(weight[i, x]) * weight[i, x]
+            usual[wall[i]] += columns * trust[i] ** 2 * score_power[i]
+        where = transform(lanes.reshape(lanes.size), 0, radix, twiddle, one, other)
+        for i in some:
+            found[wall[i]] += power_between(one if where == 0 else other, turn, band, i - first)
     for side in range(2):
         surprise[side] = found[side] / usual[side] if usual[side] > 0 else np.nan
 
