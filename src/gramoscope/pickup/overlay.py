@@ -288,26 +288,41 @@ def overlay(
         Columns that no frame covers (one at each end, lost to interpolation) repeat their neighbour.
     """
     height, width = images.shape[1:]
-    canvas_width = overlay_width(width, shift_px)
-    counts = frames_in(width, shift_px)
-    columns = picture_room(canvas_width, height)
-    tiles = all_tiles((height, canvas_width)) if wanted is None else wanted
-    share = (1 / np.maximum(counts, 1)).astype(np.float32)
+    columns = picture_room(overlay_width(width, shift_px), height)
+    tiles = all_tiles((height, len(columns))) if wanted is None else wanted
     film, step = film_line(images)
-    places, fraction = _by_fraction(shift_px, width, canvas_width)
-    _overlay(film, (step, width), places, fraction, share, tiles, columns)
-    covered = np.flatnonzero(counts)
-    if covered.size:
-        columns[: covered[0]] = columns[covered[0]]
-        columns[covered[-1] + 1 :] = columns[covered[-1]]
+    counts = np.empty(len(columns), np.int64)
+    _draw(film, (step, width), shift_px, tiles, counts, columns)
     return Overlay(columns, counts, shift_px, frame_index)
 
 
-def _by_fraction(shift_px: FloatArray, width: int, canvas_width: int) -> tuple[IntArray, FloatArray]:
+@numba.njit(cache=True, nogil=True)
+def _draw(film, shape, shift_px, wanted, counts, columns):  # type: ignore[no-untyped-def]
+    """Draw what `overlay` returns, and write how many frames each column rests on."""
+    _count_frames(shift_px, shape[1], counts)
+    share = np.empty(counts.size, np.float32)
+    for x in range(counts.size):
+        share[x] = 1.0 / max(counts[x], 1)
+    places, fraction = _by_fraction(shift_px, shape[1], counts.size)
+    _overlay(film, shape, places, fraction, share, wanted, columns)
+    covered = np.flatnonzero(counts)
+    if covered.size > 0:
+        for x in range(covered[0]):
+            columns[x] = columns[covered[0]]
+        for x in range(covered[-1] + 1, counts.size):
+            columns[x] = columns[covered[-1]]
+
+
+@numba.njit(cache=True, nogil=True)
+def _by_fraction(shift_px, width, canvas_width):  # type: ignore[no-untyped-def]
     """Return number, first and last but one column, and own column minus theirs, of all frames, and their fractions, sorted."""
     places, fraction = placements(shift_px, width, canvas_width)
-    order = np.argsort(fraction, kind="stable")
-    return np.column_stack([order, places[order]]), fraction[order]
+    order = np.argsort(fraction, kind="mergesort")
+    some = np.empty((order.size, 4), np.int64)
+    for k in range(order.size):
+        some[k, 0] = order[k]
+        some[k, 1:] = places[order[k]]
+    return some, fraction[order]
 
 
 @numba.njit(cache=True, nogil=True)
@@ -334,11 +349,17 @@ def to_phases(shift_px: FloatArray) -> FloatArray:
     where the groove is believed to be along itself, and a group that is off by a tenth of a pixel is heard. A few frames stay
     as they are.
     """
+    phases: FloatArray = _to_phases(shift_px)
+    return phases
+
+
+@numba.njit(cache=True, nogil=True)
+def _to_phases(shift_px):  # type: ignore[no-untyped-def]
     if shift_px.size <= EXACT_FRAMES:
         return shift_px
-    near: FloatArray = np.rint(PHASES * shift_px) / PHASES
+    near = np.rint(PHASES * shift_px) / PHASES
     # the same fractions to the last bit
-    return np.asarray(near + np.rint((shift_px - near).mean() * 2**20) / 2**20)
+    return near + np.rint((shift_px - near).mean() * 2**20) / 2**20
 
 
 def frames_in(width: int, shift_px: FloatArray) -> npt.NDArray[np.int64]:
