@@ -108,20 +108,6 @@ def _sum_of_phases(w: LaneWriter) -> None:
     w.loop(w.builder.sdiv(w.plus(count, at_once * LANES - 1), ir.Constant(LONG, at_once * LANES)), piece)
 
 
-def _turned(w: LaneWriter, rows: list[Value]) -> list[Value]:
-    """Sixteen rows of sixteen columns as columns (J. O. Eklundh, 1972)."""
-    far = LANES // 2
-    while far:
-        order = [k if not k & far else LANES + k - far for k in range(LANES)]
-        for j in range(LANES):
-            if not j & far:
-                one, other = rows[j], rows[j + far]
-                rows[j] = w.builder.shuffle_vector(one, other, _places(order))
-                rows[j + far] = w.builder.shuffle_vector(one, other, _places([k + far for k in order]))
-        far //= 2
-    return rows
-
-
 def _means_as_columns(w: LaneWriter) -> None:
     total, begin, step, share, first, count, columns, place, height = w.arguments
     pieces, start = _in_pieces(w, count, LANES)
@@ -131,7 +117,7 @@ def _means_as_columns(w: LaneWriter) -> None:
         part = w.load(share, w.plus(first, x))
         rows = [w.load(total, w.plus(w.plus(begin, x), w.times(step, j))) for j in range(LANES)]
         into = w.plus(place, w.times(x, height))
-        for k, column in enumerate(_turned(w, [w.builder.fmul(row, part) for row in rows])):
+        for k, column in enumerate(w.turned([w.builder.fmul(row, part) for row in rows])):
             w.store(column, columns, w.plus(into, w.times(height, k)))
 
     w.loop(pieces, piece)

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gramoscope.camera.film_line import film_line
-from gramoscope.conventions import BoolArray, Float32Array, FloatArray, IntArray
+from gramoscope.conventions import BoolArray, Float32Array, FloatArray
 from gramoscope.pickup.device import Kept
 from gramoscope.pickup.film_lanes import PIXELS, sum_lines, sum_phases, write_as_columns
 from gramoscope.pickup.lane_writer import LANES

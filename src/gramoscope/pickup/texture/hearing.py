@@ -30,7 +30,7 @@ from gramoscope.pickup.texture.likelihood import (
     within,
 )
 from gramoscope.pickup.texture.spectrum import Band, half_of
-from gramoscope.pickup.texture.vector_lanes import AT_ONCE, filter_symmetrically, mix
+from gramoscope.pickup.texture.vector_lanes import AT_ONCE, filter_symmetrically, mix, squares_by_lane
 from gramoscope.pickup.texture.vector_lanes import power as usual_power
 
 if TYPE_CHECKING:
@@ -310,16 +310,27 @@ def _rooms(width, reach):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _energies(answers, lane, sign, score, loudness):  # type: ignore[no-untyped-def]
-    """Write Σ ± p² and Σ p² of filters whose answers lie in neighbouring lanes, their parts exchanged, see `fold`."""
+def _squares(answers, width, lines):  # type: ignore[no-untyped-def]
+    """Write the squares of answers, whose parts are exchanged, see `fold`, as lines, one of each lane."""
+    apart, line = lines.shape[1], lines.reshape(lines.size)
+    for x in range(0, width, LANES):
+        squares_by_lane(answers, x * LANES, line, x, apart)
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_line(sign, energies, score, loudness):  # type: ignore[no-untyped-def]
     for x in range(score.size):
-        first = (x // 2) * PAIR + (1 - x % 2) * LANES + lane
-        some, all_ = np.float32(0), np.float32(0)
-        for k in range(sign.size):
-            energy = answers[first + k] * answers[first + k]
-            some += sign[k] * energy
-            all_ += energy
-        score[x], loudness[x] = some, all_
+        score[x] += sign * energies[x]
+        loudness[x] += energies[x]
+
+
+@numba.njit(cache=True, nogil=True)
+def _energies(lines, sign, score, loudness):  # type: ignore[no-untyped-def]
+    """Write Σ ± p² and Σ p² of filters."""
+    score[:] = np.float32(0)
+    loudness[:] = np.float32(0)
+    for k in range(sign.size):
+        _add_line(sign[k], lines[k, : score.size], score, loudness)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -332,13 +343,15 @@ def listen(columns, rows, clear, half_px, ear, plan, first_bin, limits, said, we
     radix, twiddle, turn = plan
     stripes, width, count, m = rows.shape[0], columns.shape[0], sign.shape[1], len(turn) - 1
     rooms = _rooms(width, half_taps.size - 1)
-    drawn = np.zeros((2 * m, LANES), np.float32)
-    one, other, bins = (
-        np.empty(m * PAIR, np.float32),
-        np.empty(m * PAIR, np.float32),
-        np.zeros((m + 1) * PAIR, np.float32),
+    # sixteen columns of answers are looked at together: some more lie behind the last
+    drawn = np.zeros((2 * m + LANES, LANES), np.float32)[: 2 * m]
+    one, other = (
+        np.empty(m * PAIR + LANES * LANES, np.float32)[: m * PAIR],
+        np.empty(m * PAIR + LANES * LANES, np.float32)[: m * PAIR],
     )
+    bins = np.zeros((m + 1) * PAIR, np.float32)
     score, loudness = np.empty(width, np.float32), np.empty(width, np.float32)
+    lines = np.empty((LANES, -(-width // LANES) * LANES), np.float32)
     together = LANES // count
     for begin in range(0, stripes, together):
         some = range(begin, min(begin + together, stripes))
@@ -356,8 +369,9 @@ def listen(columns, rows, clear, half_px, ear, plan, first_bin, limits, said, we
         fold(bins, turn, one)
         back = drawn.reshape(drawn.size)  # which has as much room, and is written anew
         where = transform(one, 0, radix, twiddle, back, other)
+        _squares(back if where == 0 else other, width, lines)
         for i in some:
-            _energies(back if where == 0 else other, (i - begin) * count, sign[i], score, loudness)
+            _energies(lines[(i - begin) * count : (i - begin + 1) * count], sign[i], score, loudness)
             temper(score, loudness, LOUDNESS_BELL, TEMPER, said[i])
             for x in range(width):
                 said[i, x] = (said[i, x] - mean[i]) * trust[i]

@@ -214,6 +214,20 @@ def _folding(w: LaneWriter) -> None:
     w.store(b.fsub(even[0], odd[1]), z, w.plus(into, LANES))
 
 
+def _squares_by_lane(w: LaneWriter) -> None:
+    answers, first, out, place, apart = w.arguments
+    # neighbours lie in one complex lane, their parts exchanged
+    rows = [w.load(answers, w.plus(first, LANES * (k ^ 1))) for k in range(LANES)]
+    for lane, row in enumerate(w.turned([w.builder.fmul(row, row) for row in rows])):
+        w.store(row, out, w.plus(place, w.times(apart, lane)))
+
+
+@compiled
+def squares_by_lane(_, answers, first, out, place, apart):  # type: ignore[no-untyped-def]
+    """Write the squares of sixteen columns of answers, `lane_transform.fold`, to sixteen lines, `apart` from each other."""
+    return function((answers, first, out, place, apart), _squares_by_lane)
+
+
 @compiled
 def weigh_bin(_, z, here, there, turn, place, weights, begin, count, out, into):  # type: ignore[no-untyped-def]
     """Write sums over sixteen rows by some weights, of a bin that is in two places of `lane_transform.transform`.
