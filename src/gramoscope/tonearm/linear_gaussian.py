@@ -26,6 +26,7 @@ from gramoscope.tonearm.small_matrices import (
     scaled,
     times,
 )
+from gramoscope.tonearm.vector_rows import add_multiple
 
 SOURCES = 2
 FORGIVENESS = 8
@@ -182,8 +183,16 @@ def _move(a, at, q, first, agitation, m, p, m_out, p_out):  # type: ignore[no-un
     block_sandwich(a, first, p, p_out)
     for b in range(0, m.size, STATES):
         for i in range(b, b + STATES):
-            for j in range(STATES):
-                p_out[i, b + j] += agitation * q[first + i, j]
+            add_multiple(agitation, q, first + i, 0, p_out, i, b)
+
+
+@numba.njit(cache=True, nogil=True)
+def _times_few(p, w, i, out):  # type: ignore[no-untyped-def]
+    """Write p w for symmetric p and a row with few numbers that are not zero."""
+    out[:] = 0.0
+    for j in range(w.shape[1]):
+        if w[i, j] != 0:
+            add_scaled(w[i, j], p, j, out, 0, out.size)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -249,7 +258,7 @@ def _filter(a, at, q, model, agitation, places, source, h, value, variance, gate
             _lose(p, anywhere, doubt)
         scaled(1.0, m, 0, means, k, size)
         for i in range(wanted):
-            times(p, want, i, ph)
+            _times_few(p, want, i, ph)
             scaled(1.0, ph, 0, toward, k * wanted + i, size)
         if k == resume:
             m_resume[:], p_resume[:] = m, p

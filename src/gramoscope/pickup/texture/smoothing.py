@@ -63,9 +63,9 @@ def _running_means(one, other, half, out, out_other):  # type: ignore[no-untyped
     end = max(width - half - 1, begin)
     for x in range(begin):
         out[x], out_other[x] = total * share, total_other * share
-        enters = min(x + half + 1, width - 1)
-        total += one[enters] - one[0]
-        total_other += other[enters] - other[0]
+        entered = min(x + half + 1, width - 1)
+        total += one[entered] - one[0]
+        total_other += other[entered] - other[0]
     for x in range(np.uint64(begin), np.uint64(end)):
         out[x], out_other[x] = total * share, total_other * share
         enters, leaves = x + np.uint64(half + 1), x - np.uint64(half)
@@ -73,9 +73,9 @@ def _running_means(one, other, half, out, out_other):  # type: ignore[no-untyped
         total_other += other[enters] - other[leaves]
     for x in range(end, width):
         out[x], out_other[x] = total * share, total_other * share
-        leaves = max(x - half, 0)
-        total += one[width - 1] - one[leaves]
-        total_other += other[width - 1] - other[leaves]
+        left = max(x - half, 0)
+        total += one[width - 1] - one[left]
+        total_other += other[width - 1] - other[left]
 
 
 @numba.njit(cache=True, nogil=True)
