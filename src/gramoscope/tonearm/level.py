@@ -254,7 +254,20 @@ def levels(powers: Iterable[FloatArray]) -> Iterator[FloatArray]:
     for power in chain(powers, repeat(nothing, NEIGHBOURS)):
         window.append(power)
         if len(window) == 2 * NEIGHBOURS + 1:
-            known = np.isfinite(window)
-            mean = np.where(known, window, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-            level = np.where(known.any(axis=0), np.sqrt(np.maximum(mean, 0.0)), level)
+            level = _level(np.array(window), level)
             yield level
+
+
+@numba.njit(cache=True, nogil=True)
+def _level(powers, before):  # type: ignore[no-untyped-def]
+    """Return the root of the mean of what is known, or what it was before."""
+    level = before.copy()
+    for direction in range(level.size):
+        total, known = 0.0, 0
+        for power in powers[:, direction]:
+            if np.isfinite(power):
+                total += power
+                known += 1
+        if known > 0:
+            level[direction] = np.sqrt(max(total / known, 0.0))
+    return level

@@ -68,21 +68,28 @@ def stretch_of(trace: WallTrace) -> Stretch:
 
     So is a wall of which hardly anything was seen in the whole stretch: what was seen is a guess.
     """
-    place, variance = np.empty(trace.flags.shape), np.empty(trace.flags.shape)
-    flags = trace.flags.copy()
-    _measured(trace.offset_m, trace.offset_sigma_m, place, variance, flags)
-    middle = running_median(place)
+    place, variance, middle = np.empty((3, *trace.flags.shape))
+    flags, suspect = trace.flags.copy(), np.empty(trace.flags.shape, np.bool_)
+    _look_at(trace.offset_m, trace.offset_sigma_m, place, variance, flags, middle, suspect)
     return Stretch(
         arc_m=trace.arc_start_m + np.arange(trace.flags.shape[1], dtype=np.float64) * trace.arc_step_m,
         place_m=place,
         variance=variance,
         middle_m=middle,
-        suspect=suspects(place, variance, middle),
+        suspect=suspect,
         share=np.ones(trace.flags.shape),
         flags=flags,
         step_m=trace.arc_step_m,
         correlation_samples=trace.correlation_samples,
     )
+
+
+@numba.njit(cache=True, nogil=True)
+def _look_at(offset_m, sigma_m, place_m, variance, flags, middle_m, suspect):  # type: ignore[no-untyped-def]
+    """Write what was measured, its running median, and what disagrees with its neighbours."""
+    _measured(offset_m, sigma_m, place_m, variance, flags)
+    middle_m[:] = running_median(place_m)
+    suspect[:] = suspects(place_m, variance, middle_m)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -122,11 +129,13 @@ def handed_over(stretches: Iterable[Stretch]) -> Iterator[Stretch]:
 
 def counted_from_the_start(stretches: Iterable[Stretch]) -> Iterator[Stretch]:
     """Return the same stretches with each wall's places counted from where it was first seen."""
-    origin = np.full((2, 1), np.nan)
+    origin, unseen = np.full((2, 1), np.nan), [0, 1]
     for stretch in stretches:
-        for wall in np.flatnonzero(np.isnan(origin[:, 0]) & np.isfinite(stretch.place_m).any(axis=1)):
-            seen = stretch.place_m[wall]
-            origin[wall, 0] = seen[np.flatnonzero(np.isfinite(seen))[0]]
+        for wall in unseen.copy():
+            seen = np.flatnonzero(np.isfinite(stretch.place_m[wall]))
+            if seen.size:
+                origin[wall, 0] = stretch.place_m[wall, seen[0]]
+                unseen.remove(wall)
         yield replace(stretch, place_m=stretch.place_m - origin, middle_m=stretch.middle_m - origin)
 
 
@@ -182,7 +191,8 @@ def _neighbours(place_m, middle_m):  # type: ignore[no-untyped-def]
     return middle, spread
 
 
-def suspects(place_m: FloatArray, variance: FloatArray, middle_m: FloatArray) -> BoolArray:
+@numba.njit(cache=True, nogil=True)
+def suspects(place_m, variance, middle_m):  # type: ignore[no-untyped-def]
     """Return which samples disagree with their neighbours; NaN never does.
 
     Hampel's filter about the running median, with the course's own slope taken off. Where both walls leave their course by
@@ -211,15 +221,17 @@ def _hand_over(before: Stretch, after: Stretch) -> tuple[Stretch, Stretch]:
     start, end = float(after.arc_m[0]), float(before.arc_m[-1])
     if end <= start:
         return before, after
-    fade_out, fade_in = ((end - before.arc_m) / (end - start), (after.arc_m - start) / (end - start))
-    return _faded(before, fade_out, after), _faded(after, fade_in, before)
+    shares = before.share.copy(), after.share.copy()
+    _fade(before.arc_m, before.step_m, before.place_m, after.arc_m, after.step_m, after.place_m, *shares)
+    return replace(before, share=shares[0]), replace(after, share=shares[1])
 
 
-def _faded(stretch: Stretch, fade: FloatArray, other: Stretch) -> Stretch:
-    """The stretch with its share lowered wherever the other saw the same wall."""
-    share = stretch.share.copy()
-    _lower(share, fade, stretch.arc_m, stretch.step_m, other.arc_m[0], other.place_m)
-    return replace(stretch, share=share)
+@numba.njit(cache=True, nogil=True)
+def _fade(arc_m, step_m, place_m, next_arc_m, next_step_m, next_place_m, share, next_share):  # type: ignore[no-untyped-def]
+    """Lower the shares of two stretches where the other one saw the same wall."""
+    start, end = next_arc_m[0], arc_m[-1]
+    _lower(share, (end - arc_m) / (end - start), arc_m, step_m, next_arc_m[0], next_place_m)
+    _lower(next_share, (next_arc_m - start) / (end - start), next_arc_m, next_step_m, arc_m[0], place_m)
 
 
 @numba.njit(cache=True, nogil=True)
