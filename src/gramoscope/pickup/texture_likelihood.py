@@ -327,9 +327,14 @@ class TexturePickup:
 
     def models_for(self, number: int) -> list[Model]:
         """Return the models by which a group is read, round by round: none that the group itself has taught."""
-        fold = self.fold.get(number)
+        return self._models[self.fold.get(number)]
+
+    @cached_property
+    def _models(self) -> dict[int | None, list[Model]]:
+        """Those of each fold, and of groups that have taught nothing."""
         lessons = [self.lessons[i] for i in spaced(len(self.lessons), self.cartridge.rounds)]
-        return [lesson.whole if fold is None else lesson.without[fold] for lesson in lessons]
+        folds = {None, *self.fold.values()}
+        return {fold: [one.whole if fold is None else one.without[fold] for one in lessons] for fold in folds}
 
     def _trace(
         self,

@@ -222,6 +222,7 @@ def _thin_out(ridge, coarse):  # type: ignore[no-untyped-def]
         for part in range(GRID_PX):
             some = near[part::GRID_PX]
             coarse[part, cell, : some.size] = some
+            coarse[part, cell, some.size :] = np.float32(0)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -299,7 +300,7 @@ class GrooveSearch:
         """Return the lateral and the vertical displacement that suit all stripes, on a grid of `GRID_PX`."""
         cells, height = ridge.shape
         grid = _grid_of(self, layout, cut, height, cells > 1)
-        coarse = np.zeros((len(grid.halves), GRID_PX, cells, -(-height // GRID_PX)), np.float32)
+        coarse = np.empty((len(grid.halves), GRID_PX, cells, -(-height // GRID_PX)), np.float32)
         for look, half in enumerate(grid.halves):
             flanks = (half + FLANK_PX[0], half + FLANK_PX[1])
             _thin_out(ridges(sharp, half_px=half, flank_px=flanks) if half else ridge, coarse[look])

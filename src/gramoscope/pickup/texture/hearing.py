@@ -302,7 +302,8 @@ def _draw(columns, row, clear, half_px, half_taps, mixtures, usual, limits, room
 def _rooms(width, reach):  # type: ignore[no-untyped-def]
     """Return room for what `_draw` needs; columns beyond the picture are black."""
     padded = -(-width // AT_ONCE) * AT_ONCE
-    wide, white = np.zeros((padded + 2 * reach, LANES), np.float32), np.empty((padded, LANES), np.float32)
+    wide, white = np.empty((padded + 2 * reach, LANES), np.float32), np.empty((padded, LANES), np.float32)
+    wide[reach + width :] = np.float32(0)
     most = width + AT_ONCE * (STEPS + 2)
     whole = (np.empty(width, np.int64), np.empty(width, np.int64), np.empty(width, np.int64))
     begin, sorting = np.empty(STEPS + 1, np.int64), (*whole, np.empty(most, np.int64), np.empty(most, np.int64))
