@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gramoscope.tonearm import groove_model
 from gramoscope.tonearm.bryson_frazier import backward, smooth_reference
 from gramoscope.tonearm.groove_model import PassState, robustly
 from gramoscope.tonearm.groove_prior import SLOPE, GroovePrior, start
@@ -225,3 +226,15 @@ def test_what_is_followed_robustly_is_the_pass_over_what_was_accepted(wild: int)
     np.testing.assert_array_equal(followed.smoothed.sigma, again.sigma)
     np.testing.assert_array_equal(followed.state.last.mean, last.resume.mean)
     np.testing.assert_array_equal(followed.state.last.covariance, last.resume.covariance)
+
+
+@pytest.mark.parametrize(("aside", "passes"), [(0.0, 1), (1e-8, 1), (1e-3, 2)])
+def test_what_two_filters_once_differed_in_is_forgotten_when_it_has_faded(
+    aside: float, passes: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    moves, readings, all_of_them, begin = _moves(), _readings(), np.ones(75, np.bool_), _begin()
+    other = replace(begin, mean=begin.mean + aside * np.sqrt(np.diag(begin.covariance)))
+    made = []
+    monkeypatch.setattr(groove_model, "forward", lambda *given, **more: made.append(1) or forward(*given, **more))
+    robustly(moves, readings, all_of_them, PassState(0, begin, other), gate=40.0, resume_bin=20, wanted=SLOPES)
+    assert len(made) == passes

@@ -7,7 +7,15 @@ from scipy import fft
 from gramoscope.conventions import Float32Array
 from gramoscope.errors import ArgumentError
 from gramoscope.pickup.lane_writer import LANES
-from gramoscope.pickup.texture.lane_transform import PAIR, fast_length, fold, let_through, plan_for, transform
+from gramoscope.pickup.texture.lane_transform import (
+    PAIR,
+    fast_length,
+    fold,
+    let_through,
+    plan_for,
+    power_between,
+    transform,
+)
 
 LENGTHS = [2, 4, 6, 8, 10, 12, 30, 90, 96, 250, 486, 1458, 1500, 1536]
 EXACT = 1e-5
@@ -77,3 +85,12 @@ def test_fast_lengths_are_even_long_enough_and_not_much_longer(least: int) -> No
 def test_a_length_with_other_factors_is_refused(length: int) -> None:
     with pytest.raises(ArgumentError, match="an even length"):
         plan_for(length)
+
+
+@pytest.mark.parametrize("length", LENGTHS[2:])
+def test_the_power_of_a_band_is_that_of_the_spectrum(length: int) -> None:
+    rows, plan, band = _rows(length), plan_for(length), (1, length // 2 + 1)
+    line = _transformed(rows.reshape(-1), length)
+    power = np.mean(np.abs(fft.rfft(rows.astype(np.float64), axis=0)[band[0] : band[1]]) ** 2, axis=0)
+    for lane in (0, 5, LANES - 1):
+        assert power_between(line, plan.turn, band, lane) == pytest.approx(power[lane], rel=1e-4)

@@ -16,6 +16,7 @@ from gramoscope.pickup.texture.filter_bank import FilterBank, root, strongest_fi
 from gramoscope.pickup.texture.following import REACH, follow, wide_rows
 from gramoscope.pickup.texture.likelihood import (
     QUIET_BAND,
+    TAPER,
     TAPER_PX,
     believable,
     best_shares,
@@ -338,6 +339,18 @@ def test_a_weight_is_soft_zero_where_nothing_is_seen_and_one_well_inside() -> No
 def test_everything_seen_has_weight_one_to_the_very_ends() -> None:
     np.testing.assert_allclose(softened(np.ones(200, bool)), 1, atol=1e-6)
     assert softened(np.zeros(200, bool)).max() == 0
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("often", [2, 20, 120, 1000])
+def test_a_weight_between_many_gaps_is_what_is_valid_eroded_and_smoothed(often: int, seed: int) -> None:
+    rng = np.random.default_rng([often, seed])
+    valid = rng.integers(0, often, 400) > 0
+    valid[: rng.integers(0, 3) * 20] = False
+    # beyond the ends all is valid as far as erosion goes, and the outermost weight is held by the smoothing
+    core = ndimage.minimum_filter1d(np.pad(valid, TAPER_PX, constant_values=True), 2 * TAPER_PX + 1)[TAPER_PX:-TAPER_PX]
+    expected = ndimage.convolve1d(core.astype(float), TAPER, mode="nearest")
+    np.testing.assert_allclose(softened(valid), expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("sigma", [0.3, 7.0])

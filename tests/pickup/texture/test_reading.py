@@ -14,7 +14,7 @@ from gramoscope.errors import ArgumentError
 from gramoscope.pickup.overlay import places_brighter
 from gramoscope.pickup.texture import reading
 from gramoscope.pickup.texture.filter_bank import FilterBank
-from gramoscope.pickup.texture.hearing import add_up, clear_columns
+from gramoscope.pickup.texture.hearing import add_up, clear_columns, listen, told, told_by
 from gramoscope.pickup.texture.layout import StripeLayout
 from gramoscope.pickup.texture.learning import Learning
 from gramoscope.pickup.texture.likelihood import StripeStatistics
@@ -287,6 +287,22 @@ def test_a_path_is_judged_where_it_ends(seven: list[Model], another: Stretch) ->
     again = evidence(path, seven[2], RULES)
     for name in ("score", "information", "surprise"):
         np.testing.assert_array_equal(getattr(found, name), getattr(again, name))
+
+
+def test_what_is_told_in_one_kernel_is_what_is_told_step_by_step(seven: list[Model], another: Stretch) -> None:
+    model = seven[-1]
+    ear, seen, limits = model.ear, another.in_tone(model.tone), RULES.power_limits
+
+    def heard(rows: np.ndarray, clear: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        said, weight = np.empty(rows.shape), np.empty(rows.shape, np.float32)
+        listen(seen.columns, rows, clear, ear.half_px, *ear.for_listening, limits, said, weight)
+        return said, weight
+
+    at_once = told(ear, model.layout, seen, least_support=RULES.least_support, power_limits=limits)
+    in_steps = told_by(heard, ear, model.layout, seen, least_support=RULES.least_support)
+    for name in ("score", "information", "said", "weight"):
+        np.testing.assert_array_equal(getattr(at_once, name), getattr(in_steps, name))
+    assert at_once.information.max() > 0
 
 
 def test_channels_are_those_of_the_whitened_window(seven: list[Model], another: Stretch, layout: StripeLayout) -> None:

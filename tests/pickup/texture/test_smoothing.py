@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from gramoscope.pickup.texture.smoothing import blur, half_bell, half_widths, smooth
+from gramoscope.pickup.texture.smoothing import blur, half_bell, half_widths, smooth, smooth_both
 
 VALUES = np.cumsum(np.random.default_rng(2).normal(size=800)) + 3
 
@@ -50,3 +50,14 @@ def test_a_narrow_gaussian_is_the_gaussian(sigma: float, width: int) -> None:
     np.testing.assert_allclose(out, ndimage.gaussian_filter1d(values, sigma, mode="nearest"), rtol=1e-12)
     blur(values, half_bell(sigma), 0.0, 0.0, out)
     np.testing.assert_allclose(out, ndimage.gaussian_filter1d(values, sigma, mode="constant"), rtol=1e-12)
+
+
+@pytest.mark.parametrize("width", [1, 7, 40, 500])
+@pytest.mark.parametrize("sigma", [0.2, 3.0, 12.0, 200.0])
+def test_two_rows_at_a_time_are_smoothed_as_each_by_itself(sigma: float, width: int) -> None:
+    rows = np.random.default_rng(3).normal(size=(2, width))
+    together, alone = np.empty((2, 2, width))
+    smooth_both(rows[0], rows[1], sigma, together[0], together[1])
+    for row, out in zip(rows, alone, strict=True):
+        smooth(row, sigma, out)
+    np.testing.assert_array_equal(together, alone)
