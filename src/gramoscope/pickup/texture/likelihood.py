@@ -178,7 +178,7 @@ def soften(valid, tapered, weight):  # type: ignore[no-untyped-def]
             end += 1
         low = begin + reach if begin > 0 else -reach
         high = end - reach if end < width else width + reach
-        if low < high:
+        if max(low, 0) < min(high, width):
             weight[max(low + reach, 0) : max(high - reach, 0)] = 1.0
             for x in range(max(low - reach, 0), min(low + reach, width)):
                 weight[x] += tapered[min(max(high - x + reach, 0), 2 * reach + 1)] - tapered[low - x + reach]
