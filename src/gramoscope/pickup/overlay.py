@@ -14,6 +14,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from gramoscope.cache_line import single_room
 from gramoscope.camera.film_line import film_line
 from gramoscope.conventions import BoolArray, Float32Array, FloatArray
 from gramoscope.pickup.device import Kept
@@ -202,8 +203,8 @@ def _overlay(film, shape, places, fraction, share, wanted, columns):  # type: ig
     phases, taps = _phases(places, fraction)
     begins = places[:, 0] * shape[0] + places[:, 3] - 1
     longest = RUN_TILES * TILE_COLUMNS
-    total = np.empty((TILE_ROWS, longest + ROOM), np.float32)
-    lines = np.empty((len(phases) - 1) * (longest + ROOM), np.float32)
+    total = single_room(TILE_ROWS * (longest + ROOM)).reshape(TILE_ROWS, longest + ROOM)
+    lines = single_room((len(phases) - 1) * (longest + ROOM))
     for block in range(len(wanted)):
         rows = (block * TILE_ROWS, min((block + 1) * TILE_ROWS, columns.shape[1]))
         tile = 0

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numba
 import numpy as np
 
+from gramoscope.cache_line import double_room
 from gramoscope.conventions import BoolArray, FloatArray, IntArray
 from gramoscope.errors import require
 from gramoscope.quality import FlagArray
@@ -88,7 +89,8 @@ class Batch:
     def readings(self) -> FloatArray:
         """Return what eight filters abreast read, shape (eight, bin, `walls_abreast.READINGS`, `FILTERS`)."""
         eights = -(-self.size.size // FILTERS)
-        out = np.empty((eights, self.place_m.shape[2], READINGS, FILTERS))
+        shape = (eights, self.place_m.shape[2], READINGS, FILTERS)
+        out: FloatArray = double_room(int(np.prod(shape))).reshape(shape)
         _readings(self.place_m, self.variance, self.share, self.suspect, self.correlation_samples, out)
         return out
 

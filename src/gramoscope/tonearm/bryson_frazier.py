@@ -20,6 +20,7 @@ import numba
 import numpy as np
 from scipy import linalg
 
+from gramoscope.cache_line import double_room
 from gramoscope.conventions import FloatArray
 from gramoscope.tonearm.linear_gaussian import Filtered, FilterState, Moves, Readings
 from gramoscope.tonearm.small_matrices import add_products, block_sandwich, block_vector, dot, times
@@ -67,8 +68,9 @@ def _far(away, ph, j, expected, variance, r, n, nph):  # type: ignore[no-untyped
 @numba.njit(cache=True, nogil=True)
 def _smooth(a, at, model, places, h, value, variance, gate_variance, used, nu, spread, gain, expected, means, want, toward, mean, sigma, off):  # type: ignore  # fmt: skip  # noqa: E501
     size = means.shape[1]
-    r, r_next, n, n_next = np.zeros(size), np.zeros(size), np.zeros((size, size)), np.zeros((size, size))
-    one = np.empty(size)
+    r, r_next, one = double_room(size), double_room(size), double_room(size)
+    n, n_next = double_room(size * size).reshape(size, size), double_room(size * size).reshape(size, size)
+    r[:], n[:] = 0.0, 0.0
     j = places.size - 1
     for k in range(means.shape[0] - 1, -1, -1):
         r, r_next = r_next, r

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from gramoscope.cache_line import double_room
 from gramoscope.conventions import BoolArray, FloatArray
 from gramoscope.quantile import quantile
 from gramoscope.tonearm.abreast import FILTERS
@@ -145,7 +146,7 @@ def _keep_used(readings, kept):  # type: ignore[no-untyped-def]
 def _clean(a, q, at_rest, sigma, rows, gains, readings, gate, lost):  # type: ignore[no-untyped-def]
     """Allow, in all eights, the readings that the others agree with; tell which stretches lost a wall."""
     bins = readings.shape[1]
-    room, kept, off = np.empty((ROOM, FILTERS)), np.empty((KEPT * bins, FILTERS)), np.empty((WALLS * bins, FILTERS))
+    room, kept, off = _rows(ROOM), _rows(KEPT * bins), _rows(WALLS * bins)
     calm = np.ones((bins, FILTERS))
     for eight in range(len(readings)):
         seen = readings[eight].reshape(bins * READINGS, FILTERS)
@@ -223,6 +224,12 @@ def _matrices(believed: Beliefs) -> tuple[FloatArray, FloatArray]:
     return believed.a.reshape(2 * STATES, STATES), believed.q.reshape(2 * STATES, STATES)
 
 
+@numba.njit(cache=True, nogil=True)
+def _rows(count):  # type: ignore[no-untyped-def]
+    """Room for so many rows of all filters."""
+    return double_room(count * FILTERS).reshape(count, FILTERS)
+
+
 def agitations(batch: Batch, believed: Beliefs, gains: FloatArray) -> list[FloatArray]:
     """Return how much more restless the groove is, bin by bin of each stretch, than is believed of it.
 
@@ -252,8 +259,7 @@ def agitations(batch: Batch, believed: Beliefs, gains: FloatArray) -> list[Float
 def _agitate(a, q, at_rest, sigma, rows, gains, readings, factor, last):  # type: ignore[no-untyped-def]
     """Raise the factors of all stretches, [stretch, bin], and write the last bins that were read."""
     bins = readings.shape[1]
-    room, kept = np.empty((ROOM, FILTERS)), np.empty((KEPT * bins, FILTERS))
-    restless = np.empty((bins, FILTERS))
+    room, kept, restless = _rows(ROOM), _rows(KEPT * bins), _rows(bins)
     number, surprise = np.empty(bins, np.int64), np.empty(bins)
     for eight in range(len(readings)):
         seen, first = readings[eight].reshape(bins * READINGS, FILTERS), eight * FILTERS

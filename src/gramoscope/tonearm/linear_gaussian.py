@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
+from gramoscope.cache_line import at_a_line, double_room
 from gramoscope.conventions import BoolArray, FloatArray, IntArray
 from gramoscope.tonearm.small_matrices import (
     STATES,
@@ -57,7 +58,7 @@ class Moves:
     def stacked(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """All blocks of A, Aᵀ and Q one below the other, shape (model · block · n, n)."""
         a, at, q = (blocks.reshape(-1, STATES) for blocks in (self.a, self.a.swapaxes(-1, -2), self.q))
-        return np.ascontiguousarray(a), np.ascontiguousarray(at), np.ascontiguousarray(q)
+        return at_a_line(a), at_a_line(at), at_a_line(q)
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,7 +250,7 @@ def _before_others(h, j, ph, first, used, spread, gain):  # type: ignore[no-unty
 def _filter(a, at, q, model, agitation, places, source, h, value, variance, gate_variance, rule, allowed, lost, m, p, missed, since, want, means, toward, misses, sinces, used, nu, spread, gain, expected, resume, m_resume, p_resume):  # type: ignore  # fmt: skip  # noqa: E501
     width, patience, anywhere, doubt = rule
     size, wanted = m.size, want.shape[0]
-    ph, m_next, p_next = np.empty_like(m), np.empty_like(m), np.empty_like(p)
+    ph, m_next, p_next = double_room(size), double_room(size), double_room(size * size).reshape(size, size)
     loglik = 0.0
     j = 0
     for k in range(means.shape[0]):
@@ -319,9 +320,11 @@ def forward(
     """
     bins, size, n = moves.model.size, begin.mean.size, readings.value.size
     want = np.zeros((0, size)) if wanted is None else wanted
-    means, toward = np.empty((bins, size)), np.empty((bins, want.shape[0], size))
+    means = double_room(bins * size).reshape(bins, size)
+    toward = double_room(bins * want.shape[0] * size).reshape(bins, want.shape[0], size)
     misses, sinces = np.empty((bins, SOURCES), np.int64), np.empty((bins, SOURCES), np.int64)
-    used, nu, spread, expected, gain = np.zeros(n, np.bool_), np.empty(n), np.empty(n), np.empty(n), np.empty((n, size))
+    used, nu, spread, expected = np.zeros(n, np.bool_), np.empty(n), np.empty(n), np.empty(n)
+    gain = double_room(n * size).reshape(n, size)
     may = np.ones(n, np.bool_) if allowed is None else allowed
     lost = np.zeros(bins, np.bool_) if lost is None else lost.copy()
     rule = gate or Gate()
@@ -330,7 +333,7 @@ def forward(
         *moves.stacked, moves.model, moves.agitation, readings.bin, readings.source, readings.h,
         readings.value, readings.variance, readings.gate_variance,
         (rule.width, rule.patience, rule.anywhere, rule.doubt), may, lost,
-        begin.mean.copy(), begin.covariance.copy(), begin.missed.copy(), begin.since.copy(), want, means,
+        at_a_line(begin.mean), at_a_line(begin.covariance), begin.missed.copy(), begin.since.copy(), want, means,
         toward.reshape(-1, size), misses, sinces, used, nu, spread, gain, expected, resume, m_resume, p_resume,
     )  # fmt: skip
     kept = not lost[resume]

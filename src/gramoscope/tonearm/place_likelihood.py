@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
+from gramoscope.cache_line import at_a_line, double_room
 from gramoscope.conventions import FloatArray
 from gramoscope.tonearm.abreast import (
     DISTANCE,
@@ -58,7 +59,7 @@ def abreast(place_m: FloatArray, variance: FloatArray) -> PlaceReadings:
     seen = np.zeros((-(-len(place_m) // FILTERS), int((stop - first).max()), 2, FILTERS))
     seen[:, :, VARIANCE] = np.inf
     _lay_abreast(place_m, variance, first, seen)
-    return PlaceReadings(seen, len(place_m), int(np.count_nonzero(known)))
+    return PlaceReadings(at_a_line(seen), len(place_m), int(np.count_nonzero(known)))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -104,7 +105,8 @@ def place_log_likelihood(a, q, at_rest, seen, count, sigma, place_sigma_m, gate)
     gate : float
         A reading further than this many standard deviations from its prediction is rejected, and counts as if it lay there.
     """
-    now, later, tally = np.empty((ROWS, FILTERS)), np.empty((ROWS, FILTERS)), np.empty((3, FILTERS))
+    now, later = double_room(ROWS * FILTERS).reshape(ROWS, FILTERS), double_room(ROWS * FILTERS).reshape(ROWS, FILTERS)
+    tally = double_room(3 * FILTERS).reshape(3, FILTERS)
     # of ν²/S + log S of all readings
     total = 0.0
     for eight in range(seen.shape[0]):

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numba
 import numpy as np
 
+from gramoscope.cache_line import double_room
 from gramoscope.conventions import BoolArray, FloatArray, IntArray
 from gramoscope.quality import FlagArray
 from gramoscope.tonearm.groove_prior import taylor
@@ -83,7 +84,7 @@ class PlaceSamples:
 def _both_directions(row, gain):  # type: ignore[no-untyped-def]
     """Each row, and beside it the same times a gain."""
     size = row.shape[1]
-    out = np.empty((row.shape[0], 2 * size))
+    out = double_room(row.shape[0] * 2 * size).reshape(row.shape[0], 2 * size)
     for j in range(row.shape[0]):
         for i in range(size):
             out[j, i], out[j, size + i] = row[j, i], row[j, i] * gain[j]

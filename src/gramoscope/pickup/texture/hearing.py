@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numba
 import numpy as np
 
+from gramoscope.cache_line import at_a_line, single_room
 from gramoscope.conventions import INNER, OUTER, BoolArray, Float32Array, FloatArray, IntArray
 from gramoscope.pickup.lane_writer import LANES
 from gramoscope.pickup.texture.following import REACH, STEPS, step_mixtures, step_of, stepped, wide_rows
@@ -83,7 +84,8 @@ class Ear:
     def in_lanes(self) -> tuple[Float32Array, Float32Array, Float32Array]:
         """What makes channels of the picture's rows, step by step, what is usual and the filters; of sixteen channels."""
         mixtures = [step_mixtures(basis) for basis in _in_lanes(self.basis, (2,))]
-        return _stacked(mixtures, 3), _in_lanes(self.usual, (1,)), _in_lanes(self.filters, (3,))
+        weights = _stacked(mixtures, 3), _in_lanes(self.usual, (1,)), _in_lanes(self.filters, (3,))
+        return at_a_line(weights[0]), at_a_line(weights[1]), at_a_line(weights[2])
 
     @cached_property
     def for_listening(self) -> tuple[tuple[Float32Array | FloatArray, ...], tuple[Any, ...], int]:
@@ -302,7 +304,8 @@ def _draw(columns, row, clear, half_px, half_taps, mixtures, usual, limits, room
 def _rooms(width, reach):  # type: ignore[no-untyped-def]
     """Return room for what `_draw` needs; columns beyond the picture are black."""
     padded = -(-width // AT_ONCE) * AT_ONCE
-    wide, white = np.empty((padded + 2 * reach, LANES), np.float32), np.empty((padded, LANES), np.float32)
+    wide = single_room((padded + 2 * reach) * LANES).reshape(padded + 2 * reach, LANES)
+    white = single_room(padded * LANES).reshape(padded, LANES)
     wide[reach + width :] = np.float32(0)
     most = width + AT_ONCE * (STEPS + 2)
     whole = (np.empty(width, np.int64), np.empty(width, np.int64), np.empty(width, np.int64))
@@ -345,14 +348,15 @@ def listen(columns, rows, clear, half_px, ear, plan, first_bin, limits, said, we
     stripes, width, count, m = rows.shape[0], columns.shape[0], sign.shape[1], len(turn) - 1
     rooms = _rooms(width, half_taps.size - 1)
     # sixteen columns of answers are looked at together: some more lie behind the last
-    drawn = np.zeros((2 * m + LANES, LANES), np.float32)[: 2 * m]
-    one, other = (
-        np.empty(m * PAIR + LANES * LANES, np.float32)[: m * PAIR],
-        np.empty(m * PAIR + LANES * LANES, np.float32)[: m * PAIR],
-    )
-    bins = np.zeros((m + 1) * PAIR, np.float32)
+    beyond = m * PAIR + LANES * LANES
+    drawn = single_room(beyond)[: m * PAIR].reshape(2 * m, LANES)
+    one, other = single_room(beyond)[: m * PAIR], single_room(beyond)[: m * PAIR]
+    bins = single_room((m + 1) * PAIR)
+    drawn[:] = np.float32(0)
+    bins[:] = np.float32(0)
     score, loudness = np.empty(width, np.float32), np.empty(width, np.float32)
-    lines = np.empty((LANES, -(-width // LANES) * LANES), np.float32)
+    padded = -(-width // LANES) * LANES
+    lines = single_room(LANES * padded).reshape(LANES, padded)
     together = LANES // count
     for begin in range(0, stripes, together):
         some = range(begin, min(begin + together, stripes))

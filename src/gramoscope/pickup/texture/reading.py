@@ -16,6 +16,7 @@ from functools import cached_property
 import numba
 import numpy as np
 
+from gramoscope.cache_line import single_room
 from gramoscope.conventions import INNER, OUTER, Float32Array, FloatArray
 from gramoscope.disc.formats import Cut
 from gramoscope.errors import require
@@ -181,11 +182,8 @@ def _compare(said, weight, plan, band, learned, surprise):  # type: ignore[no-un
     radix, twiddle, turn = plan
     wall, trust, score_power = learned
     m = len(turn) - 1
-    lanes, one, other = (
-        np.zeros((2 * m, LANES), np.float32),
-        np.empty(m * PAIR, np.float32),
-        np.empty(m * PAIR, np.float32),
-    )
+    lanes, one, other = single_room(m * PAIR).reshape(2 * m, LANES), single_room(m * PAIR), single_room(m * PAIR)
+    lanes[:] = np.float32(0)
     found, usual = np.zeros(2), np.zeros(2)
     for first in range(0, wall.size, LANES):
         some = range(first, min(first + LANES, wall.size))
