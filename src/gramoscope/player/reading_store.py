@@ -139,11 +139,12 @@ class ReadingStore:
         OutputError
             If the disk is full.
         """
-        arrays = _arrays_of([one.trace for one in piece.groups])
+        ends = [_ends_of(one.trace) for one in piece.groups]
+        arrays = _arrays_of([one.trace for one in piece.groups], ends)
         words = {
             "key": key_of(self.manifest),
             "sums": {name: zlib.crc32(array.data) for name, array in arrays.items()},
-            "groups": [_words_of(one) for one in piece.groups],
+            "groups": [_words_of(one, both) for one, both in zip(piece.groups, ends, strict=True)],
             "failed": list(piece.failed),
             "processor": piece.processor,
         }
@@ -317,7 +318,7 @@ class Rows:
     @classmethod
     def of(cls, end: Texture) -> Self:
         """Return the rows of a strip that have any texture, even if it is −0."""
-        return cls(np.flatnonzero(end.strip.view(np.uint32).any(axis=1)), *end.strip.shape)
+        return cls(np.flatnonzero(np.bitwise_or.reduce(end.strip.view(np.uint32), axis=1)), *end.strip.shape)
 
     @classmethod
     def said(cls, words: Mapping[str, Any]) -> Self:
@@ -341,9 +342,16 @@ def _most(lengths: Any) -> int:
     return max(lengths, default=0)
 
 
-def _arrays_of(traces: Sequence[WallTrace]) -> dict[str, Any]:
+Ends = list[Rows | None]
+"""What is kept of the strips at both ends of a stretch."""
+
+
+def _ends_of(trace: WallTrace) -> Ends:
+    return [None if end is None else Rows.of(end) for end in (trace.head, trace.tail)]
+
+
+def _arrays_of(traces: Sequence[WallTrace], ends: Sequence[Ends]) -> dict[str, Any]:
     samples = _most(trace.offset_m.shape[1] for trace in traces)
-    ends = [[None if end is None else Rows.of(end) for end in (trace.head, trace.tail)] for trace in traces]
     strips = [rows for both in ends for rows in both if rows is not None]
     rows, columns = _most(strip.used.size for strip in strips), _most(strip.columns for strip in strips)
     arrays: dict[str, Any] = {
@@ -369,18 +377,17 @@ def _places_of(trace: WallTrace) -> FloatArray:
     return np.array([trace.arc_start_m, trace.arc_step_m, trace.correlation_samples, *trace.wall_angle_rad])
 
 
-def _words_of(reading: GroupReading) -> dict[str, Any]:
+def _words_of(reading: GroupReading, ends: Ends) -> dict[str, Any]:
     trace = reading.trace
-    ends = (trace.head, trace.tail)
     return {
         "number": trace.number,
         "samples": trace.offset_m.shape[1],
         "frame_step_m": trace.frame_step_m.tolist(),
         "problems": list(trace.problems),
-        "strips": [None if end is None else Rows.of(end).in_words() for end in ends],
+        "strips": [None if kept is None else kept.in_words() for kept in ends],
         "strip_places": [
             None if end is None else [float(end.arc_start_m), float(end.pixel_pitch_m), float(end.stage_m)]
-            for end in ends
+            for end in (trace.head, trace.tail)
         ],
         "frames_lost": reading.frames_lost,
         "files": [[file.name, file.sha256, file.size_bytes, file.modified_ns] for file in reading.files],
