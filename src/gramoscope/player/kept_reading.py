@@ -242,8 +242,9 @@ def kept_reading_of(
         useless = False
         try:
             executor = work.executor or Threads(workers)
-            executor.get_ready()
             store = _store(root, capture, recipe, device, work)
+            if not all(map(store.is_written, store.pieces)):
+                executor.get_ready()
             pickup, store = _learned(store, capture, recipe, device, work, learn)
             yield KeptReading(Reader(capture, pickup, store), work, executor)
             useless = not work.keep_reading

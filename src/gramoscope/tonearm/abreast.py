@@ -22,7 +22,8 @@ from gramoscope.tonearm.vector_rows import PARTS, STATES, Value, Writer, compile
 FILTERS = STATES
 """As many as states, so that both fill a row."""
 MOVED_BY = (range(STATES), *[part for part in PARTS for _ in part])
-"""On which states each depends a step later."""
+MOVED_BACK_BY = tuple(tuple(k for k in range(STATES) if i in MOVED_BY[k]) for i in range(STATES))
+"""On which states each depends a step later, and by Aᵀ."""
 MEAN = STATES * (STATES + 1) // 2
 """First row of the mean."""
 ROWS = MEAN + STATES
@@ -51,10 +52,19 @@ def _observed(write: Writer) -> tuple[Value, Value]:
     return build.select(wild, nothing, precision), away
 
 
-def _weighted(write: Writer, i: int, values: Any, total: Value | None = None) -> Value:
-    """The i-th row of A times values."""
-    for k in MOVED_BY[i]:
-        factor = write.spread(0, i, k)
+def weighted(
+    write: Writer,
+    i: int,
+    values: Any,
+    total: Value | None = None,
+    *,
+    matrix: int = 0,
+    first: int = 0,
+    back: bool = False,
+) -> Value:
+    """The i-th row of A, or of Aᵀ, times values, and more; A is an array from a first row on."""
+    for k in (MOVED_BACK_BY if back else MOVED_BY)[i]:
+        factor = write.spread(matrix, first + k, i) if back else write.spread(matrix, first + i, k)
         total = write.builder.fmul(factor, values[k]) if total is None else write.times_and(factor, values[k], total)
     return total
 
@@ -69,13 +79,13 @@ def _step(write: Writer) -> None:
     for i in range(STATES):
         moved = []
         for j in range(STATES):
-            moved.append(_weighted(write, i, {k: write.load(2, covariance_row(k, j)) for k in MOVED_BY[i]}))
+            moved.append(weighted(write, i, {k: write.load(2, covariance_row(k, j)) for k in MOVED_BY[i]}))
         columns.append(moved[0])
-        write.store(write.times_and(moved[0], shift, _weighted(write, i, means)), 4, MEAN + i)
+        write.store(write.times_and(moved[0], shift, weighted(write, i, means)), 4, MEAN + i)
         less = build.fneg(build.fmul(moved[0], precision))
         for j in range(i + 1):
             noise = build.fmul(loudness, write.spread(1, i, j))
-            write.store(_weighted(write, j, moved, write.times_and(less, columns[j], noise)), 4, covariance_row(i, j))
+            write.store(weighted(write, j, moved, write.times_and(less, columns[j], noise)), 4, covariance_row(i, j))
 
 
 @compiled

@@ -122,7 +122,7 @@ def batch_of(stretches: Sequence[tuple[Stretch, FloatArray]], step_m: float) -> 
 
     Raises
     ------
-    InputError
+    ArgumentError
         If the samples of a stretch are not as far from each other as the grid's.
     """
     for stretch, _ in stretches:

@@ -66,6 +66,7 @@ L_P, V_P = CHANGES, CHANGES + STATES
 L_Q, V_Q = L_P + BOTH, V_P + BOTH
 L_R, V_R = L_Q + BOTH, V_Q + BOTH
 L_S, V_S = L_R + BOTH, V_R + BOTH
+"""Rows of the room: both directions of what changes a matrix, p, q, r and s."""
 _LATERAL, _ACROSS, _VERTICAL = STATE + SQUARES[0], STATE + ACROSS, STATE + SQUARES[1]
 
 

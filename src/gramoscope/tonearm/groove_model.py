@@ -64,8 +64,8 @@ class Beliefs:
 
     def sigma(self, level: FloatArray) -> FloatArray:
         """Return the standard deviations of the slopes (of their bodies) at levels, both of shape (…, 2)."""
-        share, floor = np.array([(prior.share, prior.floor) for prior in self.priors]).T
-        return np.asarray(self.sigma_of_bend * np.maximum(share * level, floor))
+        bends = [prior.bends(level[..., i]) for i, prior in enumerate(self.priors)]
+        return np.asarray(self.sigma_of_bend * np.stack(bends, axis=-1))
 
     def model(self, from_bin: int, level: FloatArray) -> GrooveModel:
         """Return what is believed at a level, shape (2,), from a bin on."""

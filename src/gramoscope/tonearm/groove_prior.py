@@ -68,9 +68,9 @@ class GroovePrior:
     share: float = 1.0
     floor: float = 0.0
 
-    def bends(self, level: float) -> float:
-        """Return how much the groove is believed to bend at a level, a change of slope over `BEND_M`."""
-        return max(self.share * level, self.floor)
+    def bends(self, level: FloatArray | float) -> FloatArray:
+        """Return how much the groove is believed to bend at levels, a change of slope over `BEND_M`."""
+        return np.maximum(self.share * np.asarray(level), self.floor)
 
     def slope_density(self, wavenumber_per_m: FloatArray) -> FloatArray:
         """Return S_u + S_v in metres, two-sided, for var u = 1: its integral over dk/2π from −∞ to ∞ is 1 + `wide_share`²."""

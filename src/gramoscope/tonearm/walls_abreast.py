@@ -19,7 +19,8 @@ from collections.abc import Sequence
 from llvmlite import ir
 from numba import types
 
-from gramoscope.tonearm.vector_rows import PARTS, STATES, Value, Writer, compiled, function
+from gramoscope.tonearm.abreast import weighted
+from gramoscope.tonearm.vector_rows import STATES, Value, Writer, compiled, function
 
 WALLS = 2
 BLOCK = STATES * STATES
@@ -50,7 +51,6 @@ LOUDNESS = TALLIES + TALLY
 ROOM = LOUDNESS + 4
 """Of the room in which filters work: P or N, m or r, t, the gains, products with P or N, p, q, r, s of what changes them,
 tallies, σ² of both directions, and σ² times agitation."""
-_MOVED_BY = (range(STATES), *[part for part in PARTS for _ in part])
 
 
 class _Numbers:
@@ -96,17 +96,6 @@ class _Numbers:
 def _carried(write: Writer, *, back: bool, square: bool) -> None:
     """Arrays: the transition, a second one if not of a square, X, p, q, r, s; of squares forwards the noise and its power."""
     x, p, q, r, s = range(1, 6) if square else range(2, 7)
-    moved_by = COUPLED_BACK if back else _MOVED_BY
-
-    def moved(matrix: int, i: int, values: Sequence[Value]) -> Value:
-        total = None
-        for k in moved_by[i]:
-            factor = write.spread(matrix, k, i) if back else write.spread(matrix, i, k)
-            total = (
-                write.builder.fmul(factor, values[k]) if total is None else write.times_and(factor, values[k], total)
-            )
-        return total
-
     half: list[list[Value]] = [[] for _ in range(STATES)]
     for j in range(STATES):
         of_q, of_s = write.load(q, j), write.load(s, j)
@@ -117,20 +106,16 @@ def _carried(write: Writer, *, back: bool, square: bool) -> None:
             for k in range(STATES)
         ]
         for i in range(STATES):
-            half[i].append(moved(0, i, column))
+            half[i].append(weighted(write, i, column, back=back))
     power = None if back or not square else write.load(s + 2)
     for i in range(STATES):
         for j in range(i + 1 if square else STATES):
-            out = moved(0 if square else 1, j, half[i])
+            out = weighted(write, j, half[i], matrix=0 if square else 1, back=back)
             if power is not None:
                 out = write.times_and(power, write.spread(s + 1, i, j), out)
             write.store(out, x, STATES * i + j)
             if square and i != j:
                 write.store(out, x, STATES * j + i)
-
-
-COUPLED_BACK = tuple(tuple(k for k in range(STATES) if k == 0 or k in part) for part in ((), *_MOVED_BY[1:]))
-"""Of Aᵀ: columns that are not zero, for each of its rows."""
 
 
 def _times_taylor(write: Writer) -> None:
@@ -160,12 +145,8 @@ def _moved_both(write: Writer, *, back: bool) -> None:
     for direction in range(2):
         x = [write.load(1, STATES * direction + k) for k in range(STATES)]
         for i in range(STATES):
-            total = None
-            for k in (COUPLED_BACK if back else _MOVED_BY)[i]:
-                row = STATES * direction
-                factor = write.spread(0, row + k, i) if back else write.spread(0, row + i, k)
-                total = write.builder.fmul(factor, x[k]) if total is None else write.times_and(factor, x[k], total)
-            write.store(total, 1, STATES * direction + i)
+            out = weighted(write, i, x, first=STATES * direction, back=back)
+            write.store(out, 1, STATES * direction + i)
 
 
 class _Walls(_Numbers):
