@@ -24,9 +24,9 @@ from benchmarks.speed.flow_pairs import SHAPE, Pair, pairs
 from gramoscope.pickup.flow.coarse_to_fine import CoarseToFine
 from gramoscope.pickup.flow.derivatives import Derivatives
 from gramoscope.pickup.flow.flow_error import end_point_error_px
-from gramoscope.pickup.flow.horn_schunck import BYTES_A_POINT, Flow, HornSchunck, solve_horn_schunck
-from gramoscope.pickup.flow.horn_schunck import _depth as sweeps_together
+from gramoscope.pickup.flow.horn_schunck import TOGETHER, Flow, HornSchunck, solve_horn_schunck
 from gramoscope.pickup.flow.multigrid_horn_schunck import MultigridHornSchunck
+from gramoscope.pickup.flow.sweep_lanes import FIELD, ROW
 from gramoscope.signal_path import ImageArray
 
 Method = Callable[[ImageArray, ImageArray], Flow]
@@ -212,8 +212,8 @@ def table(rows: list[Row]) -> list[str]:
 def ceiling_lines(times: dict[str, float], shape: tuple[int, int], ceilings: Ceilings) -> list[str]:
     """Lines of the table of solvers."""
     points = SWEEPS * shape[0] * shape[1]
-    depth = sweeps_together(shape[1])
-    arithmetic, memory = LEANEST * points / ceilings.fma_s, BYTES_A_POINT * points / depth / ceilings.triad_bytes_s
+    arithmetic, laid_out = LEANEST * points / ceilings.fma_s, 4 * ROW / FIELD
+    memory = laid_out * shape[0] * shape[1] * -(-SWEEPS // TOGETHER) / ceilings.triad_bytes_s
     swept = LEANEST_BYTES * points / ceilings.triad_bytes_s
     lines = [
         line_of(("solver, whole picture", "least ms", "× the arithmetic", "× memory, sweep by sweep")),
@@ -226,7 +226,7 @@ def ceiling_lines(times: dict[str, float], shape: tuple[int, int], ceilings: Cei
         f"Measured in the same run, on one thread: triad {ceilings.triad_bytes_s / 1e9:.1f} GB/s, "
         f"{ceilings.fma_s / 1e9:.0f} · 10⁹ single-precision multiply-adds a second.",
         f"{SWEEPS} sweeps of {shape[1]} × {shape[0]} points: arithmetic, {LEANEST} instructions a point and sweep, "
-        f"{1e3 * arithmetic:.1f} ms; memory, {BYTES_A_POINT} bytes a point once for {depth} sweeps, {1e3 * memory:.1f} ms; "
+        f"{1e3 * arithmetic:.1f} ms; memory, {laid_out:.1f} bytes a point once for {TOGETHER} sweeps, {1e3 * memory:.1f} ms; "
         f"memory, if every sweep went through it ({LEANEST_BYTES} bytes), {1e3 * swept:.0f} ms.",
         "",
         *lines,

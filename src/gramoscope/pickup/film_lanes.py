@@ -78,7 +78,7 @@ def _sum_of_lines(w: LaneWriter) -> None:
 
 def _moved(w: LaneWriter, here: Value, behind: Value, far: int) -> Value:
     """What begins so many numbers after the first of two neighbouring vectors."""
-    return w.builder.shuffle_vector(here, behind, _places([far + k for k in range(LANES)])) if far else here
+    return w.cut(here, behind, far) if far else here
 
 
 def _sum_of_phases(w: LaneWriter) -> None:

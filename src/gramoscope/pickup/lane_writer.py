@@ -19,6 +19,7 @@ from numba.extending import intrinsic
 LANES = 16
 REAL, LONG, INT = ir.FloatType(), ir.IntType(64), ir.IntType(32)
 VECTOR = ir.VectorType(REAL, LANES)
+BITS = ir.VectorType(INT, LANES)
 ANY = ir.Constant(VECTOR, ir.Undefined)
 _SAME = ir.Constant(ir.VectorType(INT, LANES), [0] * LANES)
 Value = Any
@@ -31,14 +32,9 @@ room_for: Any = cgutils.alloca_once
 class LaneWriter:
     """Writes code about arrays; `arguments` are those of the function, arrays as pointers."""
 
-    def __init__(self, context: Any, builder: Any, signature: Any, values: Any) -> None:
+    def __init__(self, builder: Any, arguments: list[Value]) -> None:
         self.builder = builder
-        self.arguments = [
-            context.make_array(kind)(context, builder, value).data
-            if isinstance(kind, types.Array)
-            else context.cast(builder, value, kind, types.intp)
-            for kind, value in zip(signature.args, values, strict=True)
-        ]
+        self.arguments = arguments
 
     def plus(self, one: Value, other: Value | int) -> Value:
         """The sum of two whole numbers."""
@@ -50,7 +46,8 @@ class LaneWriter:
 
     def load(self, array: Value, place: Value) -> Value:
         """Sixteen numbers from a place on."""
-        return self.builder.load(self._at(array, place), align=4)
+        near = self.builder.bitcast(self.builder.gep(array, [place]), BITS.as_pointer())
+        return self.builder.bitcast(self.builder.load(near, align=4), VECTOR)
 
     def whole(self, array: Value, place: Value) -> Value:
         """A whole number."""
@@ -77,16 +74,20 @@ class LaneWriter:
 
     def less(self, from_: Value, one: Value, other: Value) -> Value:
         """The product of two vectors, taken off one more."""
-        return self.times_and(self.builder.fsub(self.constant(0.0), one), other, from_)
+        return self.times_and(self.builder.fneg(one), other, from_)
 
     def constant(self, value: float) -> Value:
         """One number, known beforehand, in all places of a vector."""
         return ir.Constant(VECTOR, [value] * LANES)
 
     def cut(self, one: Value, other: Value, begin: int) -> Value:
-        """Sixteen numbers of two vectors, one after the other, from a place on."""
-        order = ir.Constant(ir.VectorType(INT, LANES), [begin + j for j in range(LANES)])
-        return self.builder.shuffle_vector(one, other, order)
+        """Sixteen numbers of two vectors, one after the other, from a place on.
+
+        As bits, for which processors have an instruction that shifts; numbers are looked up one by one, which takes longer.
+        """
+        b = self.builder
+        order = ir.Constant(BITS, [begin + j for j in range(LANES)])
+        return b.bitcast(b.shuffle_vector(b.bitcast(one, BITS), b.bitcast(other, BITS), order), VECTOR)
 
     def totals_of_four(self, vectors: list[Value]) -> list[Value]:
         """The sums of four vectors, halves first; in pairs, the first two in one vector of two, as the others."""
@@ -157,12 +158,37 @@ class LaneWriter:
         self.builder.store(self.times_and(one, other, self.builder.load(room)), room)
 
 
-def function(arguments: tuple[Any, ...], write: Callable[[LaneWriter], None]) -> Any:
-    """Signature and code of a function that Numba can call."""
+def function(arguments: tuple[Any, ...], write: Callable[[LaneWriter], None], *, apart: str = "") -> Any:
+    """Signature and code of a function that Numba can call.
+
+    Code that stands `apart`, under a name of its own, is not mixed with what calls it: the compiler would move what the loops
+    of both have in common to memory, where vectors wait for it.
+    """
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Value:
-        write(LaneWriter(context, builder, signature, values))
+        given = [
+            context.make_array(kind)(context, builder, value).data
+            if isinstance(kind, types.Array)
+            else context.cast(builder, value, kind, types.intp)
+            for kind, value in zip(signature.args, values, strict=True)
+        ]
+        if apart:
+            builder.call(_standing_apart(builder.module, apart, [value.type for value in given], write), given)
+        else:
+            write(LaneWriter(builder, given))
         return context.get_dummy_value()
 
     places = tuple(one if isinstance(one, types.Array) else types.intp for one in arguments)
     return types.void(*places), generate
+
+
+def _standing_apart(module: Any, name: str, kinds: list[Any], write: Callable[[LaneWriter], None]) -> Value:
+    if name in module.globals:
+        return module.globals[name]
+    made = ir.Function(module, ir.FunctionType(ir.VoidType(), kinds), name)
+    made.linkage = "internal"
+    made.attributes.add("noinline")
+    builder = ir.IRBuilder(made.append_basic_block())
+    write(LaneWriter(builder, list(made.args)))
+    builder.ret_void()
+    return made

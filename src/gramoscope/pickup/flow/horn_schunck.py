@@ -38,20 +38,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from scipy import ndimage
 
+from gramoscope.cache_line import new_at_a_line
 from gramoscope.conventions import Float32Array, FloatArray
 from gramoscope.errors import require
 from gramoscope.pickup.flow.derivatives import Derivatives
+from gramoscope.pickup.flow.sweep_lanes import numbers_needed, sweep_picture
 
 AVERAGE = np.array([[1, 2, 1], [2, 0, 2], [1, 2, 1]]) / 12
 """Horn and Schunck's average over the eight neighbours."""
-CACHE_BYTES = 1 << 20
-"""What most processors keep near each core."""
-BYTES_A_POINT = 36
-"""Nine numbers: both flows before and after a sweep, three derivatives, two gains."""
+TOGETHER = 34
+"""So many sweeps go over a picture together, so that it comes from memory three times for a hundred of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,105 +59,6 @@ class Flow:
 
     u: Float32Array
     v: Float32Array
-
-
-@numba.njit(cache=True, nogil=True, fastmath={"contract"})
-def _sweep_row(u, v, y, ix, iy, it, gain_u, gain_v, share_u, share_v, side, lift, new_u, new_v):  # type: ignore[no-untyped-def]
-    """One row of a sweep: means over the neighbours, `share` of them the average and `side` the vertical pair, put right.
-
-    Indices are unsigned: one that may be negative keeps the loop from becoming vector instructions.
-    """
-    one, two, half = np.uintp(1), np.uintp(2), np.float32(0.5)
-    along_u, along_v = share_u / np.float32(6), share_v / np.float32(6)
-    corner_u, corner_v = share_u / np.float32(12), share_v / np.float32(12)
-    down_u, up = along_u + side * half, side * lift
-    n = np.uintp(y)
-    h, s = n + one, n + two
-    for x in range(ix.shape[1]):
-        w = np.uintp(x)
-        c, e = w + one, w + two
-        corners_u = (u[n, w] + u[n, e]) + (u[s, w] + u[s, e])
-        corners_v = (v[n, w] + v[n, e]) + (v[s, w] + v[s, e])
-        mean_u = corner_u * corners_u + (down_u * (u[n, c] + u[s, c]) + (along_u * (u[h, w] + u[h, e]) + up))
-        mean_v = corner_v * corners_v + along_v * ((v[n, c] + v[s, c]) + (v[h, w] + v[h, e]))
-        error = ix[n, w] * mean_u + (iy[n, w] * mean_v + it[n, w])
-        new_u[h, c] = mean_u - gain_u[n, w] * error
-        new_v[h, c] = mean_v - gain_v[n, w] * error
-
-
-@numba.njit(cache=True, nogil=True)
-def _gain_row(ix, iy, a, b, gain_u, gain_v):  # type: ignore[no-untyped-def]
-    """(I_x/a) / (1 + I_x²/a + I_y²/b) and the same for y: what does not change from sweep to sweep."""
-    one = np.float32(1)
-    for x in range(ix.size):
-        p, q = ix[x] / a, iy[x] / b
-        scale = one / (one + ix[x] * p + iy[x] * q)
-        gain_u[x] = p * scale
-        gain_v[x] = q * scale
-
-
-@numba.njit(cache=True, nogil=True)
-def _repeat_border(field, y):  # type: ignore[no-untyped-def]
-    """Give row y of a picture, which has a border of one pixel in `field`, its neighbours beyond the picture."""
-    row = field[y + 1]
-    row[0], row[-1] = row[1], row[-2]
-    if y == 0:
-        field[0] = row
-    if y == field.shape[0] - 3:
-        field[-1] = row
-
-
-@numba.njit(cache=True, nogil=True)
-def _gains(ix, iy, a, b):  # type: ignore[no-untyped-def]
-    gain_u, gain_v = np.empty_like(ix), np.empty_like(ix)
-    for y in range(ix.shape[0]):
-        _gain_row(ix[y], iy[y], a, b, gain_u[y], gain_v[y])
-    return gain_u, gain_v
-
-
-@numba.njit(cache=True, nogil=True)
-def _sweeps(ix, iy, it, lift, alpha2, beta2, gamma2, iterations, depth, u, v, u_next, v_next):  # type: ignore[no-untyped-def]
-    """All sweeps, `depth` of them at a time.
-
-    A sweep may follow the one before it at a distance of one row: then all that it reads is done, and what it writes over
-    has been read. So `depth` sweeps go down the picture together, over rows that the cache still holds. Each row is made
-    from the same numbers as if one sweep waited for the other, and comes out the same to the last bit.
-    """
-    height = ix.shape[0]
-    a, b = alpha2 + beta2, alpha2 + gamma2
-    gain_u, gain_v = _gains(ix, iy, a, b)
-    for done in range(0, iterations, depth):
-        together = min(depth, iterations - done)
-        for front in range(height + together - 1):
-            for sweep in range(max(0, front - height + 1), min(together, front + 1)):
-                y = front - sweep
-                even = (done + sweep) % 2 == 0
-                old_u, new_u = (u, u_next) if even else (u_next, u)
-                old_v, new_v = (v, v_next) if even else (v_next, v)
-                _sweep_row(
-                    old_u,
-                    old_v,
-                    y,
-                    ix,
-                    iy,
-                    it,
-                    gain_u,
-                    gain_v,
-                    alpha2 / a,
-                    alpha2 / b,
-                    beta2 / a,
-                    lift[y],
-                    new_u,
-                    new_v,
-                )
-                _repeat_border(new_u, y)
-                _repeat_border(new_v, y)
-    return (u, v) if iterations % 2 == 0 else (u_next, v_next)
-
-
-def _depth(width: int) -> int:
-    """How many sweeps go together: so many that their rows fill `CACHE_BYTES`."""
-    return max(1, CACHE_BYTES // (BYTES_A_POINT * width))
 
 
 def lift_of_shear(shear: FloatArray | None, height: int) -> FloatArray:
@@ -200,13 +100,13 @@ def solve_horn_schunck(
     -------
     Flow
     """
-    height, width = derivatives.x.shape
-    u, v, u_next, v_next = (np.zeros((height + 2, width + 2), np.float32) for _ in range(4))
-    u, v = _sweeps(
-        derivatives.x, derivatives.y, derivatives.t, lift_of_shear(shear, height).astype(np.float32),
-        np.float32(alpha**2), np.float32(beta**2), np.float32(gamma**2), iterations, _depth(width), u, v, u_next, v_next,
+    shape = derivatives.x.shape
+    u, v = np.empty(shape, np.float32), np.empty(shape, np.float32)
+    sweep_picture(
+        derivatives.x, derivatives.y, derivatives.t, lift_of_shear(shear, shape[0]).astype(np.float32), np.float32(alpha**2),
+        np.float32(beta**2), np.float32(gamma**2), iterations, TOGETHER, new_at_a_line(numbers_needed(*shape)), u, v,
     )  # fmt: skip
-    return Flow(u[1:-1, 1:-1], v[1:-1, 1:-1])
+    return Flow(u, v)
 
 
 def solve_horn_schunck_reference(
