@@ -29,7 +29,6 @@ import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
-HalfArray = npt.NDArray[np.float16]
 BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.int64]
 Columns = Literal["forward", "backward"]

@@ -26,7 +26,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from gramoscope.conventions import FloatArray, HalfArray
+from gramoscope.conventions import FloatArray
 from gramoscope.quality import FlagArray
 
 ImageArray = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
@@ -140,8 +140,8 @@ class Texture:
 
     Attributes
     ----------
-    strip : float16 array, shape (row, column)
-        Zero mean where nothing is to be seen. Half precision says each pixel to 0.02 %, far below its noise.
+    strip : float32 array, shape (row, column)
+        Zero mean where nothing is to be seen.
     arc_start_m : float
         Nominal place s of column 0, on the same footing as `WallTrace.arc_start_m`.
     pixel_pitch_m : float
@@ -149,7 +149,7 @@ class Texture:
         Where the microscope stood.
     """
 
-    strip: HalfArray
+    strip: npt.NDArray[np.float32]
     arc_start_m: float
     pixel_pitch_m: float
     stage_m: float = 0.0

@@ -150,4 +150,4 @@ def test_a_plan_adds_up(capture: Path) -> None:
     bigger = replace(plan, groups=16, frames_bytes=2 * plan.frames_bytes)
     assert bigger.playing_s(2) == pytest.approx(2 * plan.playing_s(2))
     # of the strips, wider than the overlap, the rows about the stripes are kept
-    assert 8 * 2 * 64 * 75 * 2 < plan.store_bytes < 8 * 2 * 448 * 300 * 2
+    assert 8 * 2 * 64 * 75 * 4 < plan.store_bytes < 8 * 2 * 448 * 300 * 4

@@ -26,7 +26,7 @@ def _strip(start_px: float, *, width: int = 143, lower_px: int = 0, stage_m: flo
     columns = start_px + np.arange(width)
     picture = np.cos(frequency[:, :, None] * columns + phase[:, :, None]).sum(axis=1)
     strip = np.roll(np.pad(picture, ((10, 10), (0, 0))), lower_px, axis=0)
-    return Texture(strip.astype(np.float16), nominal_px * PITCH_M, PITCH_M, stage_m)
+    return Texture(strip.astype(np.float32), nominal_px * PITCH_M, PITCH_M, stage_m)
 
 
 @pytest.mark.parametrize("error_px", [0.0, 0.35, -3.61, 7.5, -14.2])
@@ -57,7 +57,7 @@ def test_a_move_of_the_stage_is_known_and_allowed_for() -> None:
 
 def test_strips_that_have_nothing_in_common_are_no_match() -> None:
     tail, rng = _strip(0.0, nominal_px=0.0), np.random.default_rng(4)
-    head = replace(tail, strip=rng.normal(size=tail.strip.shape).astype(np.float16), arc_start_m=20e-6)
+    head = replace(tail, strip=rng.normal(size=tail.strip.shape).astype(np.float32), arc_start_m=20e-6)
     assert np.isnan(SPLICE.match(tail, head).error_m)
     blank = replace(head, strip=np.zeros_like(tail.strip))
     assert np.isnan(SPLICE.match(tail, blank).error_m)
@@ -78,7 +78,7 @@ def test_rendered_overlaps_are_matched_to_a_twentieth_of_a_pixel() -> None:
     strips = []
     for number in range(2):
         picture, first = noise_free_strip(scene, passage, filmed_group(scene, number))
-        strips.append(Texture(np.gradient(picture, axis=1).astype(np.float16), first * pitch_m, pitch_m))
+        strips.append(Texture(np.gradient(picture, axis=1).astype(np.float32), first * pitch_m, pitch_m))
     strips[1] = replace(strips[1], arc_start_m=strips[1].arc_start_m - 1.3e-6)
     match = SPLICE.match(*strips)
     assert match.error_m / pitch_m == pytest.approx(1.3e-6 / pitch_m, abs=0.05)
@@ -126,7 +126,7 @@ def _between_rows(strip: Texture, lower_px: float) -> Texture:
     """The same strip a fraction of a row further down."""
     frequency = np.fft.fftfreq(strip.strip.shape[0])[:, None]
     spectrum = np.fft.fft(strip.strip, axis=0) * np.exp(-2j * np.pi * frequency * lower_px)
-    return replace(strip, strip=np.fft.ifft(spectrum, axis=0).real.astype(np.float16))
+    return replace(strip, strip=np.fft.ifft(spectrum, axis=0).real.astype(np.float32))
 
 
 @pytest.mark.parametrize("lower_px", [-2.3, -0.45, 0.0, 0.2, 1.5])
@@ -148,7 +148,7 @@ def _smooth_strip(start_px: float, width: int = 143) -> Texture:
     y, x = np.mgrid[0:64, 0:width]
     picture = sum(np.cos(a * (x + start_px) + b * y + c) for a, b, c in zip(kx, ky, phase, strict=True))
     fade = np.exp(-0.5 * ((y - 31.3) / 8.0) ** 2)
-    return Texture((picture * fade).astype(np.float16), start_px * PITCH_M, PITCH_M)
+    return Texture((picture * fade).astype(np.float32), start_px * PITCH_M, PITCH_M)
 
 
 def _traces(true_m: np.ndarray, nominal_m: np.ndarray, *, lost: int | None = None) -> list[WallTrace]:

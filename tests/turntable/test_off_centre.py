@@ -184,7 +184,7 @@ def test_a_tone_with_the_wow_of_an_off_centre_hole_comes_out_straight():
 
 def test_putting_right_moves_textures_along_and_nothing_else():
     hole = OffCentreHole(SMALL, 0.5e-3, 0.8)
-    strip = np.zeros((2, 3), np.float16)
+    strip = np.zeros((2, 3), np.float32)
     one = replace(trace(3, 0.02, np.ones((2, 5))), head=Texture(strip, 0.021, 1e-6), tail=Texture(strip, 0.0225, 1e-6))
     moved = hole.put_right(one)
     shift = float(hole.true_arc_m(0.02)) - 0.02

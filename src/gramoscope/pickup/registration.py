@@ -408,7 +408,7 @@ def overlap_textures(
     if not ends:
         return None, None
     start, stage = float(group.arc_start_m[first]), float(group.stage_m[first])
-    head, tail = (Texture(texture_of(end).astype(np.float16), start + end.start * pitch, pitch, stage) for end in ends)
+    head, tail = (Texture(texture_of(end), start + end.start * pitch, pitch, stage) for end in ends)
     return head, tail
 
 

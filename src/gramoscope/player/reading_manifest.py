@@ -20,7 +20,7 @@ from gramoscope.pickup.device import Device
 from gramoscope.player.provenance import versions
 from gramoscope.player.recipe import Recipe, table_of_recipe
 
-READING_FORMAT = "gramoscope-reading/3"
+READING_FORMAT = "gramoscope-reading/2"
 _DOES_NOT_READ = ("soxr", "soundfile", "system")
 _READS = ("apparatus", "camera", "disc", "microscope", "pickup", "turntable")
 _NOT_FOR_READING = ("notes", "characteristic")

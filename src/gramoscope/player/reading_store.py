@@ -3,7 +3,7 @@
     walls     float64  (group, quantity, wall, sample)   offset_m, offset_sigma_m, slope, slope_sigma
     flags     uint16   (group, wall, sample)
     places    float64  (group, place)                    arc_start_m, arc_step_m, correlation_samples, wall angles
-    strips    float16  (group, end, row, column)         the texture at both ends, for the splice; only rows that have any
+    strips    float32  (group, end, row, column)         the texture at both ends, for the splice; only rows that have any
     words     text     (piece,)                          how long each group's rows are, and which, its files, problems, sums
     learned   uint8    (byte,)                           what the passage taught the cartridge
 
@@ -27,7 +27,7 @@ import zarr
 
 from gramoscope.apparatus.bench import Bench
 from gramoscope.camera.quiet import quiet_warnings
-from gramoscope.conventions import FloatArray, HalfArray, IntArray
+from gramoscope.conventions import Float32Array, FloatArray, IntArray
 from gramoscope.listening.whole_file import output_error
 from gramoscope.player.files_seen import FileSeen
 from gramoscope.player.kept_records import DamagedRecordError, bytes_of, record_of
@@ -243,7 +243,7 @@ def create_store(
             _create(group, "walls", (group_count, 4, 2, longest), (piece, 4, 2, samples), "f8", fill=np.nan)
             _create(group, "flags", (group_count, 2, longest), (piece, 2, samples), "u2")
             _create(group, "places", (group_count, len(PLACES)), (piece, len(PLACES)), "f8", fill=np.nan)
-            _create(group, "strips", (group_count, 2, height, longest), (piece, 2, STRIP_ROWS, columns), "f2")
+            _create(group, "strips", (group_count, 2, height, longest), (piece, 2, STRIP_ROWS, columns), "f4")
             group.create_array("words", shape=(-(-group_count // piece),), chunks=(1,), dtype=str, config=_CONFIG)
             group.attrs["reading"] = said  # last: a store without it was not made to its end
         return ReadingStore(root, _arrays(root), manifest, recipe, group_count, piece)
@@ -263,7 +263,7 @@ _AXES = {
 def _create(
     group: zarr.Group, name: str, shape: tuple[int, ...], chunks: tuple[int, ...], dtype: str, fill: float = 0
 ) -> None:
-    # texture hardly gets smaller, and takes time to
+    # float32 texture hardly gets smaller, and takes time to
     packed: Any = None if name == "strips" else "auto"
     group.create_array(
         name,
@@ -318,7 +318,7 @@ class Rows:
     @classmethod
     def of(cls, end: Texture) -> Self:
         """Return the rows of a strip that have any texture, even if it is −0."""
-        return cls(np.flatnonzero(np.bitwise_or.reduce(end.strip.view(np.uint16), axis=1)), *end.strip.shape)
+        return cls(np.flatnonzero(np.bitwise_or.reduce(end.strip.view(np.uint32), axis=1)), *end.strip.shape)
 
     @classmethod
     def said(cls, words: Mapping[str, Any]) -> Self:
@@ -331,9 +331,9 @@ class Rows:
         runs = np.split(self.used, np.flatnonzero(np.diff(self.used) > 1) + 1) if self.used.size else []
         return {"rows": [[int(run[0]), int(run[-1]) + 1] for run in runs], "size": [self.height, self.columns]}
 
-    def unpacked(self, kept: HalfArray) -> HalfArray:
+    def unpacked(self, kept: Float32Array) -> Float32Array:
         """Return the strip, of the rows that were kept."""
-        strip = np.zeros((self.height, self.columns), np.float16)
+        strip = np.zeros((self.height, self.columns), np.float32)
         strip[self.used] = kept[: self.used.size, : self.columns]
         return strip
 
@@ -358,7 +358,7 @@ def _arrays_of(traces: Sequence[WallTrace], ends: Sequence[Ends]) -> dict[str, A
         "walls": np.full((len(traces), 4, 2, samples), np.nan),
         "flags": np.zeros((len(traces), 2, samples), np.uint16),
         "places": np.array([_places_of(trace) for trace in traces]),
-        "strips": np.zeros((len(traces), 2, rows, columns), np.float16),
+        "strips": np.zeros((len(traces), 2, rows, columns), np.float32),
     }
     for i, trace in enumerate(traces):
         for k, quantity in enumerate(QUANTITIES):

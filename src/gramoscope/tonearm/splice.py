@@ -19,9 +19,10 @@ from functools import lru_cache
 
 import numba
 import numpy as np
+import numpy.typing as npt
 from numpy.polynomial import polynomial
 
-from gramoscope.conventions import Float32Array, FloatArray, IntArray
+from gramoscope.conventions import FloatArray, IntArray
 from gramoscope.quality import Quality
 from gramoscope.signal_path import Texture, WallTrace
 
@@ -94,7 +95,7 @@ def correlate_strips(a, b, column_shift, row_shift, least_columns, rows):  # typ
     return out
 
 
-def _textured(strip: Float32Array) -> IntArray:
+def _textured(strip: npt.NDArray[np.float32]) -> IntArray:
     """Return the rows that hold most of a strip's texture."""
     power = np.einsum("ij,ij->i", strip, strip)
     return np.flatnonzero(power >= TEXTURED * power.max(initial=0.0))
@@ -244,25 +245,24 @@ class Splice:
         # the microscope's own move shifts the picture of the groove the other way
         stage_px = (head.stage_m - tail.stage_m) / pitch
         rows = int(np.rint(stage_px)) + np.arange(-self.row_reach_px, self.row_reach_px + 1)
-        strips = tail.strip.astype(np.float32), head.strip.astype(np.float32)
-        textured = _textured(strips[0])
-        rough = correlate_strips(*strips, columns, rows, self.least_overlap_px, textured[::COARSE])
+        textured = _textured(tail.strip)
+        rough = correlate_strips(tail.strip, head.strip, columns, rows, self.least_overlap_px, textured[::COARSE])
         i, j = np.unravel_index(int(np.argmax(rough)), rough.shape)
-        row, column, best = self._refine(*strips, int(rows[i]), int(columns[j]), textured)
+        row, column, best = self._refine(tail, head, int(rows[i]), int(columns[j]), textured)
         at_the_end = not (columns[0] < column < columns[-1] and rows[0] - 0.5 <= row <= rows[-1] + 0.5)
         if best < self.least_correlation or at_the_end:
             return Match(float("nan"), best)
         return Match(float((column - nominal_px) * pitch), best, float((stage_px - row) * pitch))
 
     def _refine(
-        self, tail: Float32Array, head: Float32Array, row: int, column: int, textured: IntArray
+        self, tail: Texture, head: Texture, row: int, column: int, textured: IntArray
     ) -> tuple[float, float, float]:
         """Row, column and height of the peak of the correlation next to where it was seen roughly; NaN without one."""
         best = 0.0
         for _ in range(REFINEMENTS):
             around = correlate_strips(
-                tail,
-                head,
+                tail.strip,
+                head.strip,
                 column + np.arange(-COLUMNS, COLUMNS + 1),
                 row + np.arange(-ROWS, ROWS + 1),
                 self.least_overlap_px,

@@ -11,9 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy.ndimage import gaussian_filter
 
-from gramoscope.conventions import HalfArray
 from gramoscope.errors import require
 from gramoscope.signal_path import StillPicture, Texture
 from gramoscope.tonearm.splice import Match, Splice
@@ -102,13 +102,13 @@ def _beyond(error_m: float, within_m: float) -> float:
     return 0.0 if abs(error_m) < within_m else error_m
 
 
-def _derivative(picture: StillPicture, start: int, stop: int) -> HalfArray:
+def _derivative(picture: StillPicture, start: int, stop: int) -> npt.NDArray[np.float32]:
     """Derivative along the groove of what a picture shows, 0 where it shows nothing."""
     image = picture.image[:, start:stop].astype(np.float32) / np.float32(picture.white_level)
     if image.size == 0:
-        return image.astype(np.float16)
+        return image
     slope = gaussian_filter(image, SMOOTHING_PX, order=(0, 1), mode="nearest")
-    return np.where(picture.seen[:, start:stop], slope, np.float32(0)).astype(np.float16)
+    return np.ascontiguousarray(np.where(picture.seen[:, start:stop], slope, np.float32(0)))
 
 
 def _of_rows(texture: Texture, rows: int) -> Texture:
