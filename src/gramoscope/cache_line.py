@@ -39,10 +39,3 @@ def at_a_line(values: npt.NDArray[Number]) -> npt.NDArray[Number]:
     there = memory[begin : begin + values.nbytes].view(values.dtype).reshape(values.shape)
     there[...] = values
     return there
-
-
-def new_at_a_line(count: int) -> npt.NDArray[np.float32]:
-    """Return room for so many numbers of single precision, with anything in it; where there are large pages, in them."""
-    memory: npt.NDArray[Any] = np.empty(4 * count + LINE_BYTES, np.uint8)
-    begin = -memory.ctypes.data % LINE_BYTES
-    return memory[begin : begin + 4 * count].view(np.float32)

@@ -41,11 +41,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from gramoscope.cache_line import new_at_a_line
 from gramoscope.conventions import Float32Array, FloatArray
 from gramoscope.errors import require
 from gramoscope.pickup.flow.derivatives import Derivatives
-from gramoscope.pickup.flow.sweep_lanes import numbers_needed, sweep_picture
+from gramoscope.pickup.flow.sweep_lanes import ROW, rows_of_strips, sweep_picture
+from gramoscope.pickup.picture_room import picture_room
 
 AVERAGE = np.array([[1, 2, 1], [2, 0, 2], [1, 2, 1]]) / 12
 """Horn and Schunck's average over the eight neighbours."""
@@ -104,7 +104,7 @@ def solve_horn_schunck(
     u, v = np.empty(shape, np.float32), np.empty(shape, np.float32)
     sweep_picture(
         derivatives.x, derivatives.y, derivatives.t, lift_of_shear(shear, shape[0]).astype(np.float32), np.float32(alpha**2),
-        np.float32(beta**2), np.float32(gamma**2), iterations, TOGETHER, new_at_a_line(numbers_needed(*shape)), u, v,
+        np.float32(beta**2), np.float32(gamma**2), iterations, TOGETHER, picture_room(rows_of_strips(*shape), ROW), u, v,
     )  # fmt: skip
     return Flow(u, v)
 

@@ -232,12 +232,11 @@ def _pass(room, places, weights, lift, height, width, sweeps, odd):  # type: ign
 
 
 @numba.njit(cache=True, nogil=True)
-def sweep_picture(ix, iy, it, lift, alpha2, beta2, gamma2, iterations, together, room, u, v):  # type: ignore[no-untyped-def]
-    """All sweeps from rest, at most so many of them together; `room` is that of `numbers_needed`, at a cache line."""
+def sweep_picture(ix, iy, it, lift, alpha2, beta2, gamma2, iterations, together, rows, u, v):  # type: ignore[no-untyped-def]
+    """All sweeps from rest, at most so many of them together; `rows` are the room for `rows_of_strips`, at a cache line."""
     height, width = ix.shape
     a, b = alpha2 + beta2, alpha2 + gamma2
     one = np.float32(1)
-    rows = room.reshape(-1, ROW)
     _write_known(ix, iy, it, one / a, one / b, rows)
     twelfth, six = np.float32(1 / 12), np.float32(6)
     weights = np.array([np.float32(2) + six * beta2 / alpha2, alpha2 / a * twelfth, alpha2 / b * twelfth], np.float32)
@@ -248,10 +247,10 @@ def sweep_picture(ix, iy, it, lift, alpha2, beta2, gamma2, iterations, together,
     places[0], places[-1] = places[1], places[-2]
     lifted = beta2 / a * np.sqrt(a) * lift
     for done in range(0, iterations, together):
-        _pass(room, places, weights, lifted, height, width, min(together, iterations - done), done & 1)
+        _pass(rows.reshape(-1), places, weights, lifted, height, width, min(together, iterations - done), done & 1)
     _read_fields(rows, (iterations & 1) == 1, one / np.sqrt(a), one / np.sqrt(b), u, v)
 
 
-def numbers_needed(height: int, width: int) -> int:
-    """How many numbers of single precision a picture takes, as sweeps need it."""
-    return -(-width // FIELD) * height * ROW
+def rows_of_strips(height: int, width: int) -> int:
+    """How many rows of `ROW` numbers a picture takes, as sweeps need it."""
+    return -(-width // FIELD) * height
