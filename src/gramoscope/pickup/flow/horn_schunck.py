@@ -49,8 +49,8 @@ from gramoscope.pickup.picture_room import picture_room
 
 AVERAGE = np.array([[1, 2, 1], [2, 0, 2], [1, 2, 1]]) / 12
 """Horn and Schunck's average over the eight neighbours."""
-TOGETHER = 34
-"""So many sweeps go over a picture together, so that it comes from memory three times for a hundred of them."""
+TOGETHER = 50
+"""So many sweeps go over a picture together, so that it comes from memory twice for a hundred of them."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -49,7 +49,7 @@ ROW = KINDS * FIELD + LANES
 """Numbers from a row of a strip to the next."""
 ROWS = 8
 """So many rows go along the picture at a time: what a few sweeps of them need stays in the cache nearest to the core."""
-CLOSE = 2
+CLOSE = 3
 """So many sweeps go along together."""
 CALLED_FOR = 3
 """Lines of the cache that are called for with each vector of `ROWS` rows: by the time that they are needed all have come."""
