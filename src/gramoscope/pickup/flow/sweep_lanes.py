@@ -55,11 +55,11 @@ CALLED_FOR = 3
 """Lines of the cache that are called for with each vector of `ROWS` rows: by the time that they are needed all have come."""
 
 
-def _point(number: int) -> Value:
+def _whole(number: int) -> Value:
     return ir.Constant(LONG, number)
 
 
-def _is(w: LaneWriter, number: Value) -> Value:
+def _where(w: LaneWriter, number: Value) -> Value:
     """Where a vector has its number so and so."""
     b = w.builder
     first = b.insert_element(ir.Constant(BITS, ir.Undefined), b.trunc(number, INT), ir.Constant(INT, 0))
@@ -71,9 +71,9 @@ def _sweep(w: LaneWriter) -> None:
     """Sweeps of some rows; if told where the picture's ends are, what lies there is its own neighbour."""
     room, places, weights, lift, column, columns, sweeps, top, odd, above, below, rows, soon, *ends = w.arguments
     b = w.builder
-    steep, mean_u, mean_v = (w.spread(weights, _point(k)) for k in range(3))
+    steep, mean_u, mean_v = (w.spread(weights, _whole(k)) for k in range(3))
     two = w.constant(2.0)
-    own_neighbour = [_is(w, number) for number in ends]
+    own_neighbour = [_where(w, number) for number in ends]
     sums = [room_for(b, VECTOR) for _ in range(6)]
 
     def piece(t: Value, s: Value) -> None:
@@ -81,7 +81,7 @@ def _sweep(w: LaneWriter) -> None:
         west, middle, east = (w.whole(places, w.plus(here, k)) for k in range(3))
         y = b.sub(top, s)
         down = w.times(y, ROW)
-        kind = w.times(b.and_(w.plus(s, odd), _point(1)), 2 * FIELD)
+        kind = w.times(b.and_(w.plus(s, odd), _whole(1)), 2 * FIELD)
         old, new = w.plus(down, kind), w.plus(w.plus(down, 2 * FIELD), b.neg(kind))
         line = w.plus(soon, w.times(w.plus(w.times(t, sweeps), s), CALLED_FOR * LANES))
         for k in range(CALLED_FOR):
@@ -101,7 +101,7 @@ def _sweep(w: LaneWriter) -> None:
                 found += [w.times_and(share, c, pair), pair]
             return found
 
-        before, now = row(above), row(_point(0))
+        before, now = row(above), row(_whole(0))
         for place, value in zip(sums, (before[0], now[0], now[1], before[2], now[2], now[3]), strict=True):
             b.store(value, place)
 
@@ -109,7 +109,7 @@ def _sweep(w: LaneWriter) -> None:
             u_above, u_here, u_pair, v_above, v_here, v_pair = (b.load(place) for place in sums)
             far = w.times(k, ROW)
             is_last = b.icmp_signed("==", k, w.plus(rows, -1))
-            after = row(w.plus(far, b.select(is_last, below, _point(ROW))))
+            after = row(w.plus(far, b.select(is_last, below, _whole(ROW))))
             for place, value in zip(sums, (u_here, *after[:2], v_here, *after[2:]), strict=True):
                 b.store(value, place)
             u = w.times_and(two, u_pair, b.fadd(u_above, after[0]))
@@ -210,24 +210,10 @@ def _pass(room, places, weights, lift, height, width, sweeps, odd):  # type: ign
                     if vector < 0 or vector >= vectors or rows <= 0:
                         continue
                     above, below = -ROW if top > 0 else 0, ROW if top + rows < height else 0
-                    first, last = -LANES * vector, width - 1 - LANES * vector
                     sweep_end(
-                        room,
-                        places,
-                        weights,
-                        lift,
-                        vector,
-                        1,
-                        1,
-                        top,
-                        (odd + sweep) & 1,
-                        above,
-                        below,
-                        rows,
-                        soon,
-                        first,
-                        last,
-                    )
+                        room, places, weights, lift, vector, 1, 1, top, (odd + sweep) & 1, above, below, rows, soon,
+                        -LANES * vector, width - 1 - LANES * vector,
+                    )  # fmt: skip
                 t += 1
 
 
