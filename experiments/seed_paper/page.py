@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from matplotlib.figure import Figure
+from PIL import Image
 
 from gramoscope.listening.ink import save_png
 
@@ -18,6 +19,13 @@ PAPER = (
     "B. Tian and J. L. Barron, *Sound from gramophone record groove surface orientation*, 16th IEEE International "
     "Conference on Image Processing, 2009"
 )
+
+
+def _pack(path: Path) -> None:
+    """Make a picture as small as it goes: pages are kept for good, where a transfer's pictures are wanted soon."""
+    with Image.open(path) as picture:
+        picture.load()
+        picture.save(path, optimize=True)
 
 
 @dataclass(frozen=True)
@@ -84,6 +92,7 @@ class Page:
         (self.folder / "pictures").mkdir(parents=True, exist_ok=True)
         file = f"pictures/{self.name}-{what}.png"
         save_png(figure, self.folder / file)
+        _pack(self.folder / file)
         words = " ".join(caption.split())
         self.parts.append(f"![{words.split('. ')[0].rstrip('.')}]({file})\n\n*{words}*")
 

@@ -76,11 +76,6 @@ def _sum_of_lines(w: LaneWriter) -> None:
     w.loop(pieces, piece)
 
 
-def _moved(w: LaneWriter, here: Value, behind: Value, far: int) -> Value:
-    """What begins so many numbers after the first of two neighbouring vectors."""
-    return w.cut(here, behind, far) if far else here
-
-
 def _sum_of_phases(w: LaneWriter) -> None:
     lines, step, taps, phases, total, place, count = w.arguments
     at_once = 2
@@ -96,9 +91,9 @@ def _sum_of_phases(w: LaneWriter) -> None:
             here = w.plus(w.times(p, step), x)
             seen = [w.load(lines, w.plus(here, k * LANES)) for k in range(at_once + 1)]
             for k, room in enumerate(first):
-                value = w.builder.fmul(weight[1], _moved(w, seen[k], seen[k + 1], 1))
+                value = w.builder.fmul(weight[1], w.cut(seen[k], seen[k + 1], 1))
                 for t in (0, 2, 3):
-                    value = w.times_and(weight[t], _moved(w, seen[k], seen[k + 1], t), value)
+                    value = w.times_and(weight[t], w.cut(seen[k], seen[k + 1], t), value)
                 w.builder.store(w.builder.fadd(w.builder.load(room), value), room)
 
         w.loop(phases, phase)
@@ -185,7 +180,7 @@ def _energies_of_cells(w: LaneWriter) -> None:
         for j in range(LANES):
             first = w.plus(w.plus(w.plus(begin, x), w.times(step, j)), -2)
             here, behind = w.load(lines, first), w.load(lines, w.plus(first, LANES))
-            far_before, before, after, far_after = (_moved(w, here, behind, far) for far in (0, 1, 3, 4))
+            far_before, before, after, far_after = (w.cut(here, behind, far) for far in (0, 1, 3, 4))
             near, beyond = w.builder.fsub(after, before), w.builder.fsub(far_after, far_before)
             difference = w.builder.fmul(w.times_and(half, beyond, near), share)
             squares.append(w.builder.fmul(difference, difference))
