@@ -11,13 +11,19 @@ The means come of sums over rows, which three rows share: with the pair d = west
 
 and N the same with α²/(12 b), k = 2 and no lift. That is 14 sums, products or both at once for both fields of a point.
 
-**Memory.** A strip of `STRIP` vectors is 128 columns wide; its rows lie one behind the other, each with all that a sweep needs:
-U and V of the sweeps of even number, U and V of odd number, p, q and r. So ten rows of a strip are ten pages of memory, not
-seventy, and a row is one cache line longer than what lies in it, or all rows would compete for the same lines of the cache.
+**Lanes.** A row is cut into sixteen stretches, one for each lane of a vector, so that vector n holds the n-th point of each: the
+points beside it are the vectors before and behind, and no number changes its lane (T. Henretty et al., Compiler Construction,
+2011). Only the first and the last vector of a row look across a seam. Where a row is no multiple of sixteen long, neighbouring
+stretches have a point in common, which both make of the same numbers.
+
+**Memory.** A strip of `STRIP` vectors has its rows one behind the other, each with all that a sweep needs: U and V of the sweeps
+of even number, U and V of odd number, p, q and r. So ten rows of a strip are ten pages of memory, not seventy, and a row is one
+cache line longer than what lies in it, or all rows would compete for the same lines of the cache.
 
 **Order.** A sweep may follow the one before it at a distance of one row and one vector: then all that it reads is there, and
-what it writes over has been read. `ROWS` rows of a few sweeps go along the picture together, close behind each other; then the
-next few sweeps, a little higher up; then the next rows. Each point is made from the same numbers as if one sweep waited for
+what it writes over has been read. `ROWS` rows of a few sweeps go along the picture together, close behind each other, each
+shorter by a vector at either end than the one before it, as seams must wait for the other end of the row; then the ends; then
+the next few sweeps, a little higher up; then the next rows. Each point is made from the same numbers as if one sweep waited for
 the other, and comes out the same to the last bit. (L. Lamport, CACM 17, 83, 1974; D. Wonnacott, IPDPS, 2000.)
 """
 
@@ -53,28 +59,31 @@ CLOSE = 3
 """So many sweeps go along together."""
 CALLED_FOR = 3
 """Lines of the cache that are called for with each vector of `ROWS` rows: by the time that they are needed all have come."""
+SEAMS = 4
+"""Of a row: lanes whose point to the west is the last but one of its stretch, lanes that have none; the same of the east."""
 
 
 def _whole(number: int) -> Value:
     return ir.Constant(LONG, number)
 
 
-def _where(w: LaneWriter, number: Value) -> Value:
-    """Where a vector has its number so and so."""
+def _lanes(w: LaneWriter, seams: Value, kind: int) -> Value:
+    """Which lanes are of a kind."""
     b = w.builder
-    first = b.insert_element(ir.Constant(BITS, ir.Undefined), b.trunc(number, INT), ir.Constant(INT, 0))
-    every = b.shuffle_vector(first, ir.Constant(BITS, ir.Undefined), ir.Constant(BITS, [0] * LANES))
-    return b.icmp_signed("==", every, ir.Constant(BITS, list(range(LANES))))
+    told = b.load(b.bitcast(b.gep(seams, [_whole(kind * LANES)]), BITS.as_pointer()), align=4)
+    return b.icmp_signed("!=", told, ir.Constant(BITS, [0] * LANES))
 
 
 def _sweep(w: LaneWriter) -> None:
-    """Sweeps of some rows; if told where the picture's ends are, what lies there is its own neighbour."""
+    """Sweeps of some rows; if told of seams, vectors that look across them, too."""
     room, places, weights, lift, column, columns, sweeps, top, odd, above, below, rows, soon, *ends = w.arguments
     b = w.builder
     steep, mean_u, mean_v = (w.spread(weights, _whole(k)) for k in range(3))
     two = w.constant(2.0)
-    own_neighbour = [_where(w, number) for number in ends]
     sums = [room_for(b, VECTOR) for _ in range(6)]
+    if ends:
+        vectors, seams = ends
+        second_west, no_west, second_east, no_east = (_lanes(w, seams, kind) for kind in range(SEAMS))
 
     def piece(t: Value, s: Value) -> None:
         here = b.sub(w.plus(column, t), s)
@@ -87,18 +96,30 @@ def _sweep(w: LaneWriter) -> None:
         for k in range(CALLED_FOR):
             w.call_for(room, w.plus(line, k * LANES))
 
+        def beside(at: Value, here_: Value) -> tuple[Value, Value]:
+            """The vectors of the points to the west and to the east."""
+            a, e = (w.load(room, w.plus(at, place)) for place in (west, east))
+            if not ends:
+                return a, e
+            first, last = b.icmp_signed("==", here, _whole(0)), b.icmp_signed("==", w.plus(here, 1), vectors)
+            # the sentinels before the first place and behind the last are those of the row's other end
+            before = w.load(room, w.plus(at, w.whole(places, b.select(first, w.plus(vectors, -1), here))))
+            after = w.load(room, w.plus(at, w.whole(places, b.select(last, _whole(2), here))))
+            before, after = b.select(second_west, before, a), b.select(second_east, after, e)
+            across = w.cut(before, before, LANES - 1), w.cut(after, after, 1)
+            return (
+                b.select(first, b.select(no_west, here_, across[0]), a),
+                b.select(last, b.select(no_east, here_, across[1]), e),
+            )
+
         def row(far: Value) -> list[Value]:
             """Of a row of U and of V: the sum of three, and of the pair."""
             found = []
             for field, share in ((0, steep), (FIELD, two)):
-                a, c, e = (w.load(room, w.plus(w.plus(w.plus(old, at), far), field)) for at in (west, middle, east))
-                left, right = w.cut(a, c, LANES - 1), w.cut(c, e, 1)
-                if own_neighbour:
-                    left, right = (
-                        b.select(own, c, side) for own, side in zip(own_neighbour, (left, right), strict=True)
-                    )
-                pair = b.fadd(left, right)
-                found += [w.times_and(share, c, pair), pair]
+                at = w.plus(w.plus(old, far), field)
+                own = w.load(room, w.plus(at, middle))
+                pair = b.fadd(*beside(at, own))
+                found += [w.times_and(share, own, pair), pair]
             return found
 
         before, now = row(above), row(_whole(0))
@@ -140,51 +161,105 @@ def sweep_columns(_, room, places, weights, lift, column, columns, sweeps, top, 
 
 
 @compiled
-def sweep_end(_, room, places, weights, lift, column, columns, sweeps, top, odd, above, below, rows, soon, first, last):  # type: ignore[no-untyped-def]
-    """Do the same where the picture's first and last column are, counted from the vector's own first number."""
-    arguments = (room, places, weights, lift, column, columns, sweeps, top, odd, above, below, rows, soon, first, last)
+def sweep_end(_, room, places, weights, lift, column, columns, sweeps, top, odd, above, below, rows, soon, vectors, seams):  # type: ignore[no-untyped-def]
+    """Do the same with vectors that may be the first or the last of so many in a row."""
+    arguments = (room, places, weights, lift, column, columns, sweeps, top, odd, above, below, rows, soon, vectors, seams)
     return function(arguments, _sweep, apart="gramoscope_sweep_end")
 
 
+@compiled
+def write_vectors(_, row, starts, first, room, place, far):  # type: ignore[no-untyped-def]
+    """Write sixteen vectors from a place on, of which the ninth … lie so `far` on: points `first` … of all stretches of a row."""
+
+    def write(w: LaneWriter) -> None:
+        row, starts, first, room, place, far = w.arguments
+        stretches = [w.load(row, w.plus(w.whole(starts, _whole(lane)), first)) for lane in range(LANES)]
+        for n, vector in enumerate(w.turned(stretches)):
+            w.store(vector, room, _nth(w, place, far, n))
+
+    return function((row, starts, first, room, place, far), write, apart="gramoscope_write_vectors")
+
+
+@compiled
+def read_vectors(_, row, starts, first, room, place, far):  # type: ignore[no-untyped-def]
+    """Read them back; the last stretch that holds a point has the last word."""
+
+    def read(w: LaneWriter) -> None:
+        row, starts, first, room, place, far = w.arguments
+        vectors = [w.load(room, _nth(w, place, far, n)) for n in range(LANES)]
+        for lane, stretch in enumerate(w.turned(vectors)):
+            w.store(stretch, row, w.plus(w.whole(starts, _whole(lane)), first))
+
+    return function((row, starts, first, room, place, far), read, apart="gramoscope_read_vectors")
+
+
+def _nth(w: LaneWriter, place: Value, far: Value, number: int) -> Value:
+    """Where the n-th of sixteen vectors lies that are halves of two strips."""
+    beside = number % STRIP * LANES
+    return w.plus(place, beside) if number < STRIP else w.plus(w.plus(place, far), beside)
+
+
+@numba.njit(cache=True, nogil=True)
+def _stretches(width, seams):  # type: ignore[no-untyped-def]
+    """Where the stretches of a row begin, and how many points each has; what lies beside their ends is written to `seams`."""
+    vectors = (width + LANES - 1) // LANES
+    starts = np.empty(LANES, np.int64)
+    for lane in range(LANES):
+        starts[lane] = lane * (width - vectors) // (LANES - 1) if width >= LANES else max(0, lane + width - LANES)
+    seams[:] = 0
+    for lane in range(LANES):
+        shared = starts[lane] - starts[lane - 1] < vectors
+        if lane > 0 and shared:
+            seams[0, lane - 1] = seams[2, lane] = 1
+        seams[1, lane] = starts[lane] == 0
+        seams[3, lane] = starts[lane] + vectors == width
+    return starts, vectors
+
+
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _write_known(ix, iy, it, per_u, per_v, rows):  # type: ignore[no-untyped-def]
-    """Write p, q and r into the rows of the strips, zero beyond the picture, and fields of zero."""
+def _write_known(ix, iy, it, per_u, per_v, starts, vectors, room):  # type: ignore[no-untyped-def]
+    """Write p, q and r into the rows of the strips, and fields of zero."""
     root_u, root_v, one = np.sqrt(per_u), np.sqrt(per_v), np.float32(1)
     height, width = ix.shape
+    rows = room.reshape(-1, ROW)
+    known = np.zeros((KINDS - 4, width + 2 * LANES), np.float32)
+    p, q, r = known[0], known[1], known[2]
     for y in range(height):
         along, across, passing = ix[y], iy[y], it[y]
-        for strip in range((width + FIELD - 1) // FIELD):
-            row, x = rows[strip * height + y], np.uintp(strip * FIELD)
-            count = min(FIELD, width - strip * FIELD)
-            row[: 2 * FIELD] = 0
-            for n in range(count):
-                k = np.uintp(n)  # an index that may be negative keeps the loop from becoming vector instructions
-                a, b, c = along[x + k], across[x + k], passing[x + k]
-                scale = one / np.sqrt(one + per_u * a * a + per_v * b * b)
-                row[k + np.uintp(4 * FIELD)] = root_u * scale * a
-                row[k + np.uintp(5 * FIELD)] = root_v * scale * b
-                row[k + np.uintp(6 * FIELD)] = scale * c
-            for field in range(4, KINDS):
-                row[field * FIELD + count : (field + 1) * FIELD] = 0
+        for x in range(width):
+            k = np.uintp(x)  # an index that may be negative keeps the loop from becoming vector instructions
+            a, b, c = along[k], across[k], passing[k]
+            scale = one / np.sqrt(one + per_u * a * a + per_v * b * b)
+            p[k] = root_u * scale * a
+            q[k] = root_v * scale * b
+            r[k] = scale * c
+        for first in range(0, vectors, LANES):
+            row = first // STRIP * height + y
+            rows[row, : 2 * FIELD] = 0
+            rows[row + height, : 2 * FIELD] = 0
+            for kind in range(4, KINDS):
+                write_vectors(known[kind - 4], starts, first, room, row * ROW + kind * FIELD, height * ROW)
 
 
 @numba.njit(cache=True, nogil=True)
-def _read_fields(rows, odd, scale_u, scale_v, u, v):  # type: ignore[no-untyped-def]
+def _read_fields(room, odd, scale_u, scale_v, starts, vectors, u, v):  # type: ignore[no-untyped-def]
     """Read the fields of even or odd number."""
     height, width = u.shape
-    first = np.uintp(2 * FIELD if odd else 0)
-    for y in range(height):
-        along, across = u[y], v[y]
-        for strip in range((width + FIELD - 1) // FIELD):
-            row, x = rows[strip * height + y], np.uintp(strip * FIELD)
-            for n in range(min(FIELD, width - strip * FIELD)):
-                k = np.uintp(n)
-                along[x + k] = scale_u * row[first + k]
-                across[x + k] = scale_v * row[first + np.uintp(FIELD) + k]
+    along = np.empty(width + 2 * LANES, np.float32)
+    for field, scale in ((u, scale_u), (v, scale_v)):
+        begin = (2 * FIELD if odd else 0) + (0 if field is u else FIELD)
+        for y in range(height):
+            for first in range((vectors - 1) // LANES * LANES, -1, -LANES):
+                row = first // STRIP * height + y
+                read_vectors(along, starts, first, room, row * ROW + begin, height * ROW)
+            out = field[y]
+            for x in range(width):
+                k = np.uintp(x)
+                out[k] = scale * along[k]
 
 
 @numba.njit(cache=True, nogil=True)
-def _pass(room, places, weights, lift, height, width, sweeps, odd):  # type: ignore[no-untyped-def]
+def _pass(room, places, weights, lift, seams, height, sweeps, odd):  # type: ignore[no-untyped-def]
     """So many sweeps, all together, once over the whole picture."""
     vectors = places.size - 2
     strips = (vectors + STRIP - 1) // STRIP
@@ -193,28 +268,50 @@ def _pass(room, places, weights, lift, height, width, sweeps, odd):  # type: ign
         for begin in range(0, sweeps, CLOSE):
             close = min(CLOSE, sweeps - begin)
             soon = (begin // CLOSE * strips // walks * height + front + ROWS) * ROW
-            inside = front - (begin + close - 1) >= 1 and front - begin + ROWS < height
-            t, end = begin, vectors + begin + close - 1
-            while t < end:
-                if inside and t - (begin + close - 1) >= 1 and t - begin < vectors - 1:
-                    many = vectors - 1 + begin - t
-                    sweep_columns(
-                        room, places, weights, lift, t - begin, many, close, front - begin, (odd + begin) & 1, -ROW, ROW, ROWS,
-                        soon,
-                    )  # fmt: skip
-                    t += many
-                    continue
-                for sweep in range(begin, begin + close):
-                    vector = t - sweep
-                    top, rows = max(front - sweep, 0), min(front - sweep + ROWS, height) - max(front - sweep, 0)
-                    if vector < 0 or vector >= vectors or rows <= 0:
-                        continue
-                    above, below = -ROW if top > 0 else 0, ROW if top + rows < height else 0
+            top = front - begin
+            if top - (close - 1) >= 1 and top + ROWS < height and vectors >= 2 * close + 2:
+                _close(room, places, weights, lift, seams, close, top, (odd + begin) & 1, soon)
+                continue
+            for sweep in range(begin, begin + close):
+                top, stop = max(front - sweep, 0), min(front - sweep + ROWS, height)
+                if top < stop:
+                    above, below = -ROW if top > 0 else 0, ROW if stop < height else 0
                     sweep_end(
-                        room, places, weights, lift, vector, 1, 1, top, (odd + sweep) & 1, above, below, rows, soon,
-                        -LANES * vector, width - 1 - LANES * vector,
+                        room, places, weights, lift, 0, vectors, 1, top, (odd + sweep) & 1, above, below, stop - top, soon,
+                        vectors, seams,
                     )  # fmt: skip
-                t += 1
+
+
+@numba.njit(cache=True, nogil=True)
+def _close(room, places, weights, lift, seams, close, top, odd, soon):  # type: ignore[no-untyped-def]
+    """A few sweeps of `ROWS` rows, from `top` on; no row beside them lies beyond the picture.
+
+    Along the row sweep k leaves out k + 1 vectors at either end: what lies beyond the seam is not there before the end.
+    """
+    vectors = places.size - 2
+    whole = 2 * close - 1
+    for t in range(1, vectors + close - 1):
+        if t == whole:
+            sweep_columns(
+                room, places, weights, lift, t, vectors - 1 - t, close, top, odd, -ROW, ROW, ROWS, soon
+            )  # fmt: skip
+        if t >= whole:
+            break
+        for k in range(close):
+            if t - k >= k + 1:
+                _piece(room, places, weights, lift, t - k, top - k, (odd + k) & 1, soon)
+    for k in range(close):
+        for n in range(1, k + 1):
+            _piece(room, places, weights, lift, n, top - k, (odd + k) & 1, soon)
+            _piece(room, places, weights, lift, vectors - 1 - n, top - k, (odd + k) & 1, soon)
+        for n in (0, vectors - 1):
+            sweep_end(room, places, weights, lift, n, 1, 1, top - k, (odd + k) & 1, -ROW, ROW, ROWS, soon, vectors, seams)
+
+
+@numba.njit(cache=True, nogil=True)
+def _piece(room, places, weights, lift, vector, top, odd, soon):  # type: ignore[no-untyped-def]
+    """One sweep of `ROWS` rows of one vector."""
+    sweep_columns(room, places, weights, lift, vector, 1, 1, top, odd, -ROW, ROW, ROWS, soon)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -222,21 +319,22 @@ def sweep_picture(ix, iy, it, lift, alpha2, beta2, gamma2, iterations, together,
     """All sweeps from rest, at most so many of them together; `rows` are the room for `rows_of_strips`, at a cache line."""
     height, width = ix.shape
     a, b = alpha2 + beta2, alpha2 + gamma2
-    one = np.float32(1)
-    _write_known(ix, iy, it, one / a, one / b, rows)
+    one, room = np.float32(1), rows.reshape(-1)
+    seams = np.empty((SEAMS, LANES), np.int32)
+    starts, vectors = _stretches(width, seams)
+    _write_known(ix, iy, it, one / a, one / b, starts, vectors, room)
     twelfth, six = np.float32(1 / 12), np.float32(6)
     weights = np.array([np.float32(2) + six * beta2 / alpha2, alpha2 / a * twelfth, alpha2 / b * twelfth], np.float32)
-    vectors = (width + LANES - 1) // LANES
     places = np.empty(vectors + 2, np.int64)
-    for x in range(vectors):
-        places[x + 1] = x // STRIP * height * ROW + x % STRIP * LANES
-    places[0], places[-1] = places[1], places[-2]
+    for n in range(vectors):
+        places[n + 1] = n // STRIP * height * ROW + n % STRIP * LANES
+    places[0], places[-1] = places[-2], places[1]
     lifted = beta2 / a * np.sqrt(a) * lift
     for done in range(0, iterations, together):
-        _pass(rows.reshape(-1), places, weights, lifted, height, width, min(together, iterations - done), done & 1)
-    _read_fields(rows, (iterations & 1) == 1, one / np.sqrt(a), one / np.sqrt(b), u, v)
+        _pass(room, places, weights, lifted, seams, height, min(together, iterations - done), done & 1)
+    _read_fields(room, (iterations & 1) == 1, one / np.sqrt(a), one / np.sqrt(b), starts, vectors, u, v)
 
 
 def rows_of_strips(height: int, width: int) -> int:
     """How many rows of `ROW` numbers a picture takes, as sweeps need it."""
-    return -(-width // FIELD) * height
+    return -(-width // LANES**2) * (LANES // STRIP) * height
