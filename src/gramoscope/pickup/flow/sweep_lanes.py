@@ -11,14 +11,14 @@ The means come of sums over rows, which three rows share: with the pair d = west
 
 and N the same with α²/(12 b), k = 2 and no lift. That is 14 sums, products or both at once for both fields of a point.
 
-**Lanes.** A row is cut into sixteen stretches, one for each lane of a vector, so that vector n holds the n-th point of each: the
-points beside it are the vectors before and behind, and no number changes its lane (T. Henretty et al., Compiler Construction,
-2011). Only the first and the last vector of a row look across a seam. Where a row is no multiple of sixteen long, neighbouring
-stretches have a point in common, which both make of the same numbers.
+**Lanes.** A row is cut into sixteen stretches, one for each lane of a vector, so that vector n holds the n-th point of each.
+What lies beside these points are the vectors before and behind, and no number changes its lane (T. Henretty et al., Compiler
+Construction, 2011). Only the first and the last vector of a row look across a seam. Where a row is no multiple of sixteen long,
+neighbouring stretches have a point in common, which both make of the same numbers.
 
-**Memory.** A strip of `STRIP` vectors has its rows one behind the other, each with all that a sweep needs: U and V of the sweeps
-of even number, U and V of odd number, p, q and r. So ten rows of a strip are ten pages of memory, not seventy, and a row is one
-cache line longer than what lies in it, or all rows would compete for the same lines of the cache.
+**Memory.** A strip of `STRIP` vectors has its rows one behind the other, each with all that a sweep needs: U and V of the
+sweeps of even number, U and V of odd number, p, q and r. So ten rows of a strip are ten pages of memory, not seventy, and a row
+is one cache line longer than what lies in it, or all rows would compete for the same lines of the cache.
 
 **Order.** A sweep may follow the one before it at a distance of one row and one vector: then all that it reads is there, and
 what it writes over has been read. `ROWS` rows of a few sweeps go along the picture together, close behind each other, each
@@ -35,7 +35,6 @@ from llvmlite import ir
 
 from gramoscope.pickup.lane_writer import (
     BITS,
-    INT,
     LANES,
     LONG,
     VECTOR,
@@ -161,15 +160,15 @@ def sweep_columns(_, room, places, weights, lift, column, columns, sweeps, top, 
 
 
 @compiled
-def sweep_end(_, room, places, weights, lift, column, columns, sweeps, top, odd, above, below, rows, soon, vectors, seams):  # type: ignore[no-untyped-def]
+def sweep_end(_, room, places, weights, lift, column, columns, sweeps, top, odd, above, below, rows, soon, vectors, seams):  # type: ignore[no-untyped-def]  # fmt: skip
     """Do the same with vectors that may be the first or the last of so many in a row."""
-    arguments = (room, places, weights, lift, column, columns, sweeps, top, odd, above, below, rows, soon, vectors, seams)
+    arguments = (room, places, weights, lift, column, columns, sweeps, top, odd, above, below, rows, soon, vectors, seams)  # fmt: skip  # noqa: E501
     return function(arguments, _sweep, apart="gramoscope_sweep_end")
 
 
 @compiled
 def write_vectors(_, row, starts, first, room, place, far):  # type: ignore[no-untyped-def]
-    """Write sixteen vectors from a place on, of which the ninth … lie so `far` on: points `first` … of all stretches of a row."""
+    """Write sixteen vectors from a place on, the last eight so `far` behind: points `first` … of all stretches of a row."""
 
     def write(w: LaneWriter) -> None:
         row, starts, first, room, place, far = w.arguments
@@ -242,20 +241,18 @@ def _write_known(ix, iy, it, per_u, per_v, starts, vectors, room):  # type: igno
 
 
 @numba.njit(cache=True, nogil=True)
-def _read_fields(room, odd, scale_u, scale_v, starts, vectors, u, v):  # type: ignore[no-untyped-def]
-    """Read the fields of even or odd number."""
-    height, width = u.shape
+def _read_field(room, begin, scale, starts, vectors, field):  # type: ignore[no-untyped-def]
+    """Read one field, whose first number lies at `begin`."""
+    height, width = field.shape
     along = np.empty(width + 2 * LANES, np.float32)
-    for field, scale in ((u, scale_u), (v, scale_v)):
-        begin = (2 * FIELD if odd else 0) + (0 if field is u else FIELD)
-        for y in range(height):
-            for first in range((vectors - 1) // LANES * LANES, -1, -LANES):
-                row = first // STRIP * height + y
-                read_vectors(along, starts, first, room, row * ROW + begin, height * ROW)
-            out = field[y]
-            for x in range(width):
-                k = np.uintp(x)
-                out[k] = scale * along[k]
+    for y in range(height):
+        for first in range((vectors - 1) // LANES * LANES, -1, -LANES):
+            place = (first // STRIP * height + y) * ROW + begin
+            read_vectors(along, starts, first, room, place, height * ROW)
+        out = field[y]
+        for x in range(width):
+            k = np.uintp(x)
+            out[k] = scale * along[k]
 
 
 @numba.njit(cache=True, nogil=True)
@@ -290,22 +287,17 @@ def _close(room, places, weights, lift, seams, close, top, odd, soon):  # type: 
     """
     vectors = places.size - 2
     whole = 2 * close - 1
-    for t in range(1, vectors + close - 1):
-        if t == whole:
-            sweep_columns(
-                room, places, weights, lift, t, vectors - 1 - t, close, top, odd, -ROW, ROW, ROWS, soon
-            )  # fmt: skip
-        if t >= whole:
-            break
-        for k in range(close):
-            if t - k >= k + 1:
-                _piece(room, places, weights, lift, t - k, top - k, (odd + k) & 1, soon)
+    for t in range(1, whole):
+        for k in range((t + 1) // 2):
+            _piece(room, places, weights, lift, t - k, top - k, (odd + k) & 1, soon)
+    many = vectors - 1 - whole
+    sweep_columns(room, places, weights, lift, whole, many, close, top, odd, -ROW, ROW, ROWS, soon)
     for k in range(close):
         for n in range(1, k + 1):
             _piece(room, places, weights, lift, n, top - k, (odd + k) & 1, soon)
             _piece(room, places, weights, lift, vectors - 1 - n, top - k, (odd + k) & 1, soon)
         for n in (0, vectors - 1):
-            sweep_end(room, places, weights, lift, n, 1, 1, top - k, (odd + k) & 1, -ROW, ROW, ROWS, soon, vectors, seams)
+            sweep_end(room, places, weights, lift, n, 1, 1, top - k, (odd + k) & 1, -ROW, ROW, ROWS, soon, vectors, seams)  # fmt: skip  # noqa: E501
 
 
 @numba.njit(cache=True, nogil=True)
@@ -332,7 +324,9 @@ def sweep_picture(ix, iy, it, lift, alpha2, beta2, gamma2, iterations, together,
     lifted = beta2 / a * np.sqrt(a) * lift
     for done in range(0, iterations, together):
         _pass(room, places, weights, lifted, seams, height, min(together, iterations - done), done & 1)
-    _read_fields(room, (iterations & 1) == 1, one / np.sqrt(a), one / np.sqrt(b), starts, vectors, u, v)
+    last = 2 * FIELD * (iterations & 1)
+    _read_field(room, last, one / np.sqrt(a), starts, vectors, u)
+    _read_field(room, last + FIELD, one / np.sqrt(b), starts, vectors, v)
 
 
 def rows_of_strips(height: int, width: int) -> int:
