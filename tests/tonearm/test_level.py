@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from gramoscope.tonearm import level
-from gramoscope.tonearm.level import EIGHTH_DIFFERENCE, ENOUGH, claim_error
+from gramoscope.tonearm.level import EIGHTH_DIFFERENCE, ENOUGH, bend_noise, bend_powers, claim_error
+from gramoscope.tonearm.stretches import running_median
 
 SIGMA_M = 5e-8
 SAMPLES = 165
@@ -84,3 +86,45 @@ def test_where_hardly_anything_was_seen_claims_are_believed() -> None:
     # an error is never believed to be more than three times, or less than half, of what it claims
     assert claim_error(*_walls(5 * errors), 1) == 3.0
     assert claim_error(*_walls(0.1 * errors), 1) == 0.5
+
+
+@pytest.mark.parametrize(
+    ("lag", "shared"),
+    # independent medians of the same seven are not alike by this count, and no film is so coarse
+    [(lag, shared) for lag in (1, 3, 6, 16, 50) for shared in (1.0, 4.0, 9.7) if lag > 6 or shared > 1],
+)
+def test_what_errors_bend_is_known_however_many_neighbours_share_them(lag: int, shared: float) -> None:
+    rng = np.random.default_rng(11)
+    error = rng.normal(size=(400, 1000))
+    if shared > 1:
+        # a Gaussian window of this width makes errors as alike as readings that share so many
+        error = ndimage.gaussian_filter1d(error, shared / np.sqrt(4 * np.pi), axis=1, mode="wrap")
+        error /= error.std()
+    middle = np.vstack([running_median(pair) for pair in error.reshape(-1, 2, 1000)])
+    bend = middle[:, 2 * lag :] - 2 * middle[:, lag:-lag] + middle[:, : -2 * lag]
+    known = bend_noise(lag, shared)
+    assert abs(bend.var() / 6 - known) < 0.04 + 0.15 * known
+
+
+def test_a_tone_is_as_loud_as_it_is_where_neighbours_share_errors_and_claim_too_much() -> None:
+    rng, shared, lag, step_m = np.random.default_rng(12), 9.7, 3, 16e-6
+    noise = ndimage.gaussian_filter1d(rng.normal(size=(2, 20_000)), shared / np.sqrt(4 * np.pi), axis=1, mode="wrap")
+    noise *= 10e-6 / noise.std()
+    tone = 40e-6 * np.sin(2 * np.pi * np.arange(20_000) / 40)
+
+    def heard(place_m: np.ndarray, claimed_m: float) -> float:
+        powers = bend_powers(
+            running_median(place_m),
+            np.full(noise.shape, claimed_m**2),
+            np.array([-1.0, 1.0]),
+            listened="lateral",
+            step_m=step_m,
+            correlation_samples=shared,
+        )
+        return float(powers[0])
+
+    # the median of a sine makes more of it than its mean square does
+    loud = 1.4826**2 * 0.5 * (40e-6 * (2 - 2 * np.cos(2 * np.pi * lag / 40)) / (lag * step_m)) ** 2
+    assert 0 < heard(noise, 10e-6) < 0.1 * loud
+    assert heard(tone + noise, 10e-6) == pytest.approx(loud, rel=0.25)
+    assert heard(tone + noise, 60e-6) > 0.2 * loud

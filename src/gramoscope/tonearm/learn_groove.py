@@ -114,7 +114,7 @@ def lessons(
     means, errors, first = means[enough], errors[enough], known[enough].argmax(axis=1)
     counted_from_the_first = means - np.take_along_axis(means, first[:, None], axis=1)
     readings = abreast(counted_from_the_first, correlation_samples[enough, None] * errors)
-    power = slope_power(OneDirection(seen.place_m[enough], seen.variance[enough]), step_m)
+    power = slope_power(OneDirection(seen.place_m[enough], seen.variance[enough]), correlation_samples[enough], step_m)
     return Lessons(block * step_m, readings, level[enough], power)
 
 

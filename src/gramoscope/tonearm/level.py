@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from itertools import chain, repeat
 
 import numba
@@ -31,12 +32,17 @@ BOTH_WALLS = 0.1
 """A stretch that shows both walls over less than this share is read by its best wall alone."""
 MEDIAN_VARIANCE = 0.21
 """Variance of the median of seven normal numbers, for each unit of theirs."""
+LIKE_A_MEAN_OF = 5
+"""So many neighbours have a mean with about the errors of the median of seven, whether they are alike or not."""
 EIGHTH_DIFFERENCE = np.array([1.0, -8.0, 28.0, -56.0, 70.0, -56.0, 28.0, -8.0, 1.0])
 ENOUGH = 1500
 """For each sample of a block so many differences must be known: they overlap, and fewer would be off by more than 3 %."""
 SOUND_GROWS = 1.25
 """Errors that a block of one sample more hears so many times as large are sound. Errors of readings grow by 0.93 … 1.19; a
 groove whose slope falls by only 6 dB an octave up to 40 kHz, by 1.47."""
+AT_LEAST = 0.25
+"""Of the power of what bends so much is sound, where neighbours share errors: such claims cannot be put right (`claim_error`),
+and a prior that takes sound for silence loses it, while one that takes silence for sound hardly loses anything."""
 NEIGHBOURS = 2
 """So many stretches on each side take part in a level."""
 
@@ -113,21 +119,63 @@ def _one_direction(place_m, variance, lateral, gains, listening, own, out, error
         error[k] = weight[0] ** 2 * variance[0, k] + weight[1] ** 2 * variance[1, k]
 
 
+def likeness(apart: IntArray, correlation_samples: float) -> FloatArray:
+    """Return how alike errors of readings are that lie so many samples apart, −1 … 1.
+
+    1 for the same reading, and nothing beyond where errors are independent (`correlation_samples` of 1). Else a Gaussian, as of
+    readings that were averaged over their neighbours; its sum over all distances is `correlation_samples`.
+    """
+    if correlation_samples <= 1:
+        return np.asarray(apart == 0, np.float64)
+    return np.asarray(np.exp(-np.pi * (apart / correlation_samples) ** 2))
+
+
+@cache
+def bend_noise(lag: int, correlation_samples: float) -> float:
+    """Return what errors add to the variance of a bend of running medians, for each unit of that of independent readings.
+
+    Parameters
+    ----------
+    lag : int
+        Samples over which the bend is taken.
+    correlation_samples : float
+        See `likeness`.
+    """
+    if correlation_samples <= 1:
+        return MEDIAN_VARIANCE
+    second = np.zeros(2 * lag + 1)
+    second[[0, lag, -1]] = 1.0, -2.0, 1.0
+    weight = np.convolve(second, np.full(LIKE_A_MEAN_OF, 1 / LIKE_A_MEAN_OF))
+    place = np.arange(weight.size)
+    alike = likeness(place[:, None] - place, correlation_samples)
+    return float(weight @ alike @ weight) / float(second @ second)
+
+
 def bend_powers(
-    place_m: FloatArray, variance: FloatArray, gains: FloatArray, *, listened: Direction, step_m: float
+    middle_m: FloatArray,
+    variance: FloatArray,
+    gains: FloatArray,
+    *,
+    listened: Direction,
+    step_m: float,
+    correlation_samples: float = 1.0,
 ) -> FloatArray:
     """Return the variances of the bends of one stretch in both directions, lateral first.
 
     Parameters
     ----------
-    place_m, variance : float64 arrays, shape (2, sample)
-        Of both walls, NaN where unknown.
+    middle_m : float64 array, shape (2, sample)
+        Running medians of the places of both walls (`stretches.running_median`), which outliers hardly move; NaN where unknown.
+    variance : float64 array, shape (2, sample)
+        Of the places themselves.
     gains : float64 array, shape (2,)
         See `one_direction`.
     listened : {"lateral", "vertical"}
         The direction that is listened to.
     step_m : float
         From one sample to the next.
+    correlation_samples : float
+        How many neighbours share one error.
 
     Returns
     -------
@@ -135,24 +183,26 @@ def bend_powers(
         Below zero by chance when silent, NaN when hardly seen.
     """
     lag = max(int(np.rint(BEND_M / step_m)), 1)
-    power: FloatArray = _bend_powers(place_m, variance, gains, listened == "lateral", lag)
+    noise = bend_noise(lag, correlation_samples) * variance
+    at_least = AT_LEAST if correlation_samples > 1 else 0.0
+    power: FloatArray = _bend_powers(middle_m, noise, gains, listened == "lateral", lag, at_least)
     return power / (lag * step_m) ** 2
 
 
 @numba.njit(cache=True, nogil=True)
-def _bend_powers(place_m, variance, gains, laterally, lag):  # type: ignore[no-untyped-def]
+def _bend_powers(place_m, variance, gains, laterally, lag, at_least):  # type: ignore[no-untyped-def]
     power, place, error = np.empty(2), np.empty(place_m.shape[1]), np.empty(place_m.shape[1])
     for direction in range(2):
         _one_direction(
             place_m, variance, direction == 0, gains, (direction == 0) == laterally, place.size, place, error
         )
-        power[direction] = bend_power(place, error, lag)
+        power[direction] = bend_power(place, error, lag, at_least)
     return power
 
 
 @numba.njit(cache=True, nogil=True)
-def bend_power(place_m, variance, lag):  # type: ignore[no-untyped-def]
-    """Return the variance of second differences over a lag, without what errors make of them."""
+def bend_power(place_m, variance, lag, at_least=0.0):  # type: ignore[no-untyped-def]
+    """Return the variance of second differences over a lag, without what errors make of them; this share of it at least."""
     bends, noise = np.empty(place_m.size), np.empty(place_m.size)
     seen = 0
     for i in range(lag, place_m.size - lag):
@@ -162,17 +212,21 @@ def bend_power(place_m, variance, lag):  # type: ignore[no-untyped-def]
             seen += 1
     if seen < LEAST_SAMPLES:
         return np.nan
-    return (NORMAL * quantile(bends[:seen], 0.5)) ** 2 - quantile(noise[:seen], 0.5)
+    bent = (NORMAL * quantile(bends[:seen], 0.5)) ** 2
+    power = bent - quantile(noise[:seen], 0.5)
+    return max(power, at_least * bent) if at_least > 0 else power
 
 
-def slope_power(one: OneDirection, step_m: float) -> FloatArray:
+def slope_power(one: OneDirection, correlation_samples: FloatArray, step_m: float) -> FloatArray:
     """Return the mean square of the slopes of each stretch over `BEND_M`; below zero by chance when silent, or NaN."""
     lag = max(int(np.rint(BEND_M / step_m)), 1)
     moved = one.place_m[:, lag:] - one.place_m[:, :-lag]
-    noise = one.variance[:, lag:] + one.variance[:, :-lag]
+    alike = np.array([likeness(np.array(lag), shared) for shared in correlation_samples])
+    noise = (one.variance[:, lag:] + one.variance[:, :-lag]) * (1 - alike[:, None])
     seen = np.isfinite(moved) & np.isfinite(noise)
     known = np.count_nonzero(seen, axis=1)
-    power = np.where(seen, moved**2 - noise, 0.0).sum(axis=1) / np.maximum(known, 1)
+    power, spoilt = (np.where(seen, each, 0.0).sum(axis=1) / np.maximum(known, 1) for each in (moved**2, noise))
+    power = np.maximum(power - spoilt, np.where(correlation_samples > 1, AT_LEAST * power, -np.inf))
     return np.where(known < LEAST_SAMPLES, np.nan, power / (lag * step_m) ** 2)
 
 

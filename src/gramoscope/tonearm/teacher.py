@@ -17,7 +17,7 @@ from gramoscope.tonearm.course import Course
 from gramoscope.tonearm.groove_model import GrooveModel, beliefs
 from gramoscope.tonearm.groove_prior import GroovePrior
 from gramoscope.tonearm.learn_groove import Lessons, PriorLimits, learn, lessons
-from gramoscope.tonearm.level import MEDIAN_VARIANCE, bend_powers, claim_error, levels, one_direction
+from gramoscope.tonearm.level import bend_powers, claim_error, levels, one_direction
 from gramoscope.tonearm.place_samples import PlaceSamples
 from gramoscope.tonearm.stretches import Stretch
 
@@ -82,10 +82,13 @@ class Teacher:
         yield from zip(one, levels(map(self._powers, other)), strict=True)
 
     def _powers(self, stretch: Stretch) -> FloatArray:
-        """By the running medians, which outliers hardly move."""
-        variance = MEDIAN_VARIANCE * stretch.variance
         return bend_powers(
-            stretch.middle_m, variance, self.course.gains, listened=self.course.direction, step_m=self.step_m
+            stretch.middle_m,
+            stretch.variance,
+            self.course.gains,
+            listened=self.course.direction,
+            step_m=self.step_m,
+            correlation_samples=stretch.correlation_samples,
         )
 
     def _learn(self, claimed: Batch, before: Priors | None) -> tuple[Priors, float]:
