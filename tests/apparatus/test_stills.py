@@ -169,7 +169,7 @@ def test_a_jpeg_opens_nearly_as_it_was(tmp_path: Path) -> None:
 def test_what_nobody_knows_is_assumed_and_said(tmp_path: Path, picture: np.ndarray) -> None:
     write_png(tmp_path / "a.png", picture)
     bench = open_picture(tmp_path / "a.png").bench
-    assert (bench.sensor.pixel_pitch_m, bench.rotation.rpm, bench.rotation.radius_m) == (1e-6, 78.0, 0.115)
+    assert (bench.sensor.pixel_pitch_m, bench.rotation.rpm, bench.rotation.radius_m) == (4e-6, 78.0, 0.115)
     assert len(bench.assumed) == 3
     known = StillManifest((), pixel_pitch_m=2e-6, rpm=45.0, radius_m=0.1)
     assert open_picture(tmp_path / "a.png", known).bench.assumed == ()
@@ -190,7 +190,7 @@ def test_a_lost_picture_is_told_and_not_seen(tmp_path: Path, picture: np.ndarray
     assert not lost.seen.any()
     assert lost.problems == ("gone.png is missing",)
     assert found.seen.all()
-    assert found.arc_start_m == pytest.approx(40e-6)
+    assert found.arc_start_m == pytest.approx(160e-6)
     with pytest.raises(NoFramesError, match=r"gone\.png"):
         open_stills(written(tmp_path, SMALL.replace("a.png", "gone.png")))
 

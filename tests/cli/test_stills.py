@@ -49,6 +49,8 @@ def test_what_is_known_is_no_assumption(gramoscope: Callable[..., Any], picture:
         "columns",
         "--groove",
         2,
+        "--wall-angle-deg",
+        51.5,
     )
     said = gramoscope("play", picture, "--out", tmp_path / "out", "--rate", 24000, *known, "--json")
     report = json.loads(said.out)
@@ -56,6 +58,7 @@ def test_what_is_known_is_no_assumption(gramoscope: Callable[..., Any], picture:
     assert not report["scale"]["groove_along_found"]
     assert report["speed"]["rpm"] == report["speed"]["capture_rpm"] == pytest.approx(100 / 3)
     assert report["bench"]["rotation"]["radius_m"] == pytest.approx(0.0925)
+    assert report["bench"]["disc"]["wall_angle_rad"] == pytest.approx(np.deg2rad(51.5))
     assert report["seconds"] == pytest.approx(899 * 4e-6 / (2 * np.pi * 100 / 180 * 0.0925), abs=1e-4)
     assert [row["groove"] for row in report["grooves"]["played"]] == [2]
 
@@ -63,7 +66,7 @@ def test_what_is_known_is_no_assumption(gramoscope: Callable[..., Any], picture:
 def test_info_looks_at_a_picture(gramoscope: Callable[..., Any], picture: Path) -> None:
     said = gramoscope("info", picture)
     assert said.code == 0
-    assert "not known; assumed: one pixel is 1 µm" in said.out
+    assert "not known; assumed: one pixel is 4 µm" in said.out
     assert "along the columns, found in the picture" in said.out
     assert json.loads(gramoscope("info", picture, "--json").out)["sound"] is True
 
@@ -84,6 +87,7 @@ def test_info_finds_what_is_missing(gramoscope: Callable[..., Any], picture: Pat
     ("options", "words"),
     [
         (("--pixel-pitch-um", 0), "a positive length"),
+        (("--wall-angle-deg", 90), "above 0, below 90"),
         (("--groove", 9), "1 … 3"),
         (("--turn-px", 5000), "leave turn_px out"),
         (("--recipe", "best"), "for photographs"),

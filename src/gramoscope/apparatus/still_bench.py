@@ -18,7 +18,8 @@ from gramoscope.disc.formats import Disc
 from gramoscope.errors import require
 from gramoscope.turntable.rotation import Rotation
 
-ASSUMED_PIXEL_PITCH_M = 1e-6
+ASSUMED_PIXEL_PITCH_M = 4e-6
+"""Edges resolve waves down to a dozen pixels or so, which sound at 20 kHz then: what a picture shows can be heard."""
 ASSUMED_RPM = 78.0
 ASSUMED_RADIUS_M = 0.115
 

@@ -22,7 +22,7 @@ class PictureOptions:
     Parameters
     ----------
     pixel_pitch_um
-        Of a picture: one pixel, measured on the record. When nobody knows, one pixel is taken for 1 µm.
+        Of a picture: one pixel, measured on the record. When nobody knows, one pixel is taken for 4 µm.
     radius_mm
         Of a picture: radius of its grooves. When nobody knows, 115 mm.
     groove_along
@@ -36,6 +36,9 @@ class PictureOptions:
         Of a picture that shows whole turns side by side: pixels in a turn. Each groove then goes on as the next.
     cut
         Of a picture: direction of the sound.
+    wall_angle_deg
+        Of a picture: angle of each wall against the land. It says how far edges move apart when the groove gets deeper, and so
+        which part of their motion goes to which channel of a stereo record.
     """
 
     pixel_pitch_um: Annotated[float | None, FINITE] = None
@@ -45,20 +48,23 @@ class PictureOptions:
     across: Literal["inward", "outward"] | None = None
     turn_px: Annotated[float | None, FINITE] = None
     cut: Literal["lateral", "vertical", "stereo"] = "lateral"
+    wall_angle_deg: Annotated[float, FINITE] = 45.0
 
     def manifest(self, rpm: str | None = None) -> StillManifest:
         """Return what is known, in SI units."""
         from gramoscope.apparatus.manifest_still import StillManifest
         from gramoscope.apparatus.still_bench import Row
+        from gramoscope.conventions import rad
         from gramoscope.disc.formats import Disc
         from gramoscope.errors import require
         from gramoscope.turntable.speeds import speed_called
 
         for name, value in (("--pixel-pitch-um", self.pixel_pitch_um), ("--radius-mm", self.radius_mm)):
             require(value is None or value > 0, f"{name} {value}", "a positive length")
+        require(0 < self.wall_angle_deg < 90, f"--wall-angle-deg {self.wall_angle_deg:g}", "above 0, below 90")
         return StillManifest(
             pictures=(),
-            disc=Disc(cut=self.cut),
+            disc=Disc(cut=self.cut, wall_angle_rad=rad(self.wall_angle_deg)),
             pixel_pitch_m=None if self.pixel_pitch_um is None else self.pixel_pitch_um / MICROMETRES_PER_METRE,
             rpm=None if rpm is None else speed_called(rpm).rpm,
             radius_m=None if self.radius_mm is None else self.radius_mm / MILLIMETRES_PER_METRE,
