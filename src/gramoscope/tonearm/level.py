@@ -132,7 +132,10 @@ def likeness(apart: IntArray, correlation_samples: float) -> FloatArray:
 
 @cache
 def bend_noise(lag: int, correlation_samples: float) -> float:
-    """Return what errors add to the variance of a bend of running medians, for each unit of that of independent readings.
+    """Return what is taken off the variance of a bend of running medians, for each unit of that of independent readings.
+
+    As much as errors bend that neighbours share, but no more than medians of independent ones would: over lags at which
+    shared errors bend more, claims come out a twentieth too small if that is taken off, and nothing else is better.
 
     Parameters
     ----------
@@ -148,7 +151,7 @@ def bend_noise(lag: int, correlation_samples: float) -> float:
     weight = np.convolve(second, np.full(LIKE_A_MEAN_OF, 1 / LIKE_A_MEAN_OF))
     place = np.arange(weight.size)
     alike = likeness(place[:, None] - place, correlation_samples)
-    return float(weight @ alike @ weight) / float(second @ second)
+    return min(float(weight @ alike @ weight) / float(second @ second), MEDIAN_VARIANCE)
 
 
 def bend_powers(

@@ -99,7 +99,7 @@ def column_places(
         steps = _steps(rest, halo, profile, noise, kept, settled=settled)
     # the step has taken noise along where the profile is steep; likeness is judged where it is not, and beside no halo
     flat = np.abs(profile.gradient) < FLAT * np.abs(profile.gradient).max()
-    beside = np.where(flat & kept & (halo < FAINT * noise), steps.own(kept), 0.0)
+    beside = np.where(flat & kept & (halo < FAINT * noise), steps.grain(kept), 0.0)
     errors = steps.covariance
     if not settled:
         errors = errors + toeplitz(likeness(beside.T, rest.shape[1])) - np.eye(rest.shape[1])
@@ -111,7 +111,7 @@ def column_places(
 
 @dataclass(frozen=True, eq=False)
 class _Steps:
-    """Steps of all columns, what they rest on, and the covariance and halo they were weighed by, in units of the noise."""
+    """Steps of all columns, what they rest on, and what they were weighed by, in units of the noise."""
 
     step: FloatArray
     share: FloatArray
@@ -120,11 +120,20 @@ class _Steps:
     after: FloatArray
     covariance: FloatArray
     halo: FloatArray
+    patterns: FloatArray
     patchy: bool
 
     def own(self, kept: BoolArray) -> FloatArray:
         """What is left of each pixel after the step, without the patterns that come and go."""
         return filtered(self.covariance, kept, self.after) if self.patchy else self.after
+
+    def grain(self, kept: BoolArray) -> FloatArray:
+        """What is left of each pixel after the step and without any land or wall that is brighter as a whole.
+
+        Such patterns last for many columns, and the step hardly hears them: what they have in common is none of its errors.
+        """
+        left = np.where(kept, self.after, 0.0)
+        return np.asarray(left - left @ np.linalg.pinv(self.patterns).T @ self.patterns.T)
 
     def variance(self, covariance: FloatArray) -> FloatArray:
         """Of the steps, by the covariance of the pixels."""
@@ -139,21 +148,22 @@ def _steps(
     clear = profile.gradient / noise
     noise = np.hypot(noise, halo)
     rest, gradient, halo = rest / noise, profile.gradient / noise, halo / noise
+    place = np.arange(rest.shape[1]) - (rest.shape[1] - 1) / 2
+    bright = np.mean(profile.light[:, None] / noise, axis=0)
+    patterns = bright[:, None] * patch_patterns(place, SOFT_STEP_PX)
     if rest.shape[1] <= NARROW:
-        covariance = np.eye(rest.shape[1])
+        # the next edge lies within: nothing is known to be land or wall as a whole
+        covariance, patterns = np.eye(rest.shape[1]), np.zeros((rest.shape[1], 1))
     elif settled:
         covariance = seen_covariance(rest, kept)
     else:
-        place = np.arange(rest.shape[1]) - (rest.shape[1] - 1) / 2
-        bright = np.mean(profile.light[:, None] / noise, axis=0)
-        patterns = bright[:, None] * patch_patterns(place, SOFT_STEP_PX)
         covariance = patchy_covariance(rest, kept, patterns, np.abs(place) > AWAY_PX)
     pull = filtered_beside(covariance, kept, gradient, halo)
     gain = (pull * gradient).sum(axis=1)
     share = np.where(gain[:, None] > 0, pull / np.where(gain > 0, gain, 1.0)[:, None], 0.0)
     step = (share * rest).sum(axis=1)
     after, lost = rest - gradient * step[:, None], _lost(covariance, kept, clear)
-    return _Steps(step, share, gain, lost, after, covariance, halo, patchy=not settled)
+    return _Steps(step, share, gain, lost, after, covariance, halo, patterns, patchy=not settled)
 
 
 def _lost(covariance: FloatArray, kept: BoolArray, gradient: FloatArray) -> FloatArray:
