@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.ndimage import binary_dilation
+from scipy.ndimage import binary_dilation, gaussian_filter1d
 from scipy.special import ndtr
 
 from gramoscope.conventions import INNER, OUTER, FloatArray
@@ -94,6 +94,20 @@ def test_a_wall_that_shines_by_turns_moves_no_edge(photograph: Make, picture_of:
     for groove, true in zip(grooves, drawn.edges(), strict=True):
         error = groove.row_px - true
         assert np.abs(2 * np.mean((error - error.mean(axis=1, keepdims=True)) * wave, axis=1)).max() < MOVED_PX
+
+
+def test_a_wall_that_shines_by_turns_makes_no_error_larger(photograph: Make, picture_of: Make) -> None:
+    drawn = photograph(columns=1000, noise=6.0, noise_blur_px=0.7, swing_px=6.0, period_px=40.0)
+    row = np.arange(drawn.rows)[:, None]
+    walls = sum(ndtr(row - edge[OUTER]) - ndtr(row - edge[INNER]) for edge in drawn.edges())
+    shine = gaussian_filter1d(np.random.default_rng(6).normal(size=drawn.columns), 8.0)
+    image = drawn.still().image + 14.0 * shine / shine.std() * walls
+    grooves = CARTRIDGE.find(picture_of(np.clip(np.rint(image), 0, 255).astype(np.uint8)))
+    calm = CARTRIDGE.find(drawn.still())
+    # what many columns have in common is their shine, not their errors: taken for these, claims were a quarter too large
+    for groove, other in zip(grooves, calm, strict=True):
+        assert groove.correlation_samples < 1.2 * other.correlation_samples
+    assert 0.88 < np.sqrt(np.mean(_pulls(grooves, drawn.edges()) ** 2)) < 1.15
 
 
 def test_columns_keep_to_themselves_when_told_so(photograph: Make) -> None:
