@@ -32,11 +32,13 @@ WORKERS = 2
 
 @dataclass(frozen=True)
 class Played:
-    """How one passage went."""
+    """How one passage went; memory is the most that the client had by half of the passage, by all of it, and in the end."""
 
     groups: int
     learning_s: float
     playing_s: float
+    half_mib: float
+    played_mib: float
     peak_mib: float
     real_time_factor: float
 
@@ -58,10 +60,13 @@ def played(folder: Path, out: Path) -> Played:
     """Play a capture; meant to run in a process of its own."""
     capture = open_capture(folder)
     learned: list[float] = []
+    memory_mib: dict[int, float] = {}
 
-    def noted(_done: int, _total: int, what: str) -> None:
+    def noted(done: int, total: int, what: str) -> None:
         if what == "Learning":
             learned.append(time.perf_counter())
+        elif done in (total // 2, total):
+            memory_mib[done] = peak_mib()
 
     started = time.perf_counter()
     work = Work(usual_executor(WORKERS, capture.group_count))
@@ -73,9 +78,16 @@ def played(folder: Path, out: Path) -> Played:
         capture.group_count,
         playing - started,
         playing_s,
-        resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        memory_mib[capture.group_count // 2],
+        memory_mib[capture.group_count],
+        peak_mib(),
         sounding_s / playing_s,
     )
+
+
+def peak_mib() -> float:
+    """Return the most memory that this process has had so far."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def page(rows: list[Played]) -> str:
@@ -89,12 +101,13 @@ def page(rows: list[Played]) -> str:
         "does, from uncompressed TIFF (12 frames of 1280 × 512 a group) to sound files, report and picture; learning takes "
         "its 64 groups however long the passage is.",
         "*× the one before*: the passage is twice as long, so this should be 2.00, but for what is done once (processes "
-        "started, compiled code loaded, the tonearm's first lesson, report and picture): some four seconds.",
+        "started, compiled code loaded, the tonearm's first lesson, report and picture): some four seconds. "
+        "*Memory*: the most that the client had by half of the passage, by all of it, and with report and picture.",
         "",
         "| groups | learning s | playing s | × the one before | ms a group | ms each further group "
-        "| client's peak memory MiB "
+        "| client's memory MiB: half way | all played | in the end "
         "| real-time factor of playing |",
-        "|---|---|---|---|---|---|---|---|",
+        "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for before, row in zip([None, *rows], rows, strict=False):
         times, further = "–", "–"
@@ -103,7 +116,7 @@ def page(rows: list[Played]) -> str:
             further = f"{(row.playing_s - before.playing_s) / (row.groups - before.groups) * 1e3:.1f}"
         lines.append(
             f"| {row.groups} | {row.learning_s:.1f} | {row.playing_s:.2f} | {times} | {row.playing_s / row.groups * 1e3:.1f} "
-            f"| {further} | {row.peak_mib:.0f} | {row.real_time_factor:.4f} |"
+            f"| {further} | {row.half_mib:.0f} | {row.played_mib:.0f} | {row.peak_mib:.0f} | {row.real_time_factor:.4f} |"
         )
     return "\n".join([*lines, ""])
 
