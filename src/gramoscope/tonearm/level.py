@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import cache
 from itertools import chain, repeat
 
 import numba
@@ -130,7 +129,6 @@ def likeness(apart: IntArray, correlation_samples: float) -> FloatArray:
     return np.asarray(np.exp(-np.pi * (apart / correlation_samples) ** 2))
 
 
-@cache
 def bend_noise(lag: int, correlation_samples: float) -> float:
     """Return what is taken off the variance of a bend of running medians, for each unit of that of independent readings.
 
@@ -149,9 +147,9 @@ def bend_noise(lag: int, correlation_samples: float) -> float:
     second = np.zeros(2 * lag + 1)
     second[[0, lag, -1]] = 1.0, -2.0, 1.0
     weight = np.convolve(second, np.full(LIKE_A_MEAN_OF, 1 / LIKE_A_MEAN_OF))
-    place = np.arange(weight.size)
-    alike = likeness(place[:, None] - place, correlation_samples)
-    return min(float(weight @ alike @ weight) / float(second @ second), MEDIAN_VARIANCE)
+    apart = np.arange(1 - weight.size, weight.size)
+    bent = float(np.correlate(weight, weight, "full") @ likeness(apart, correlation_samples))
+    return min(bent / float(second @ second), MEDIAN_VARIANCE)
 
 
 def bend_powers(
@@ -228,8 +226,10 @@ def slope_power(one: OneDirection, correlation_samples: FloatArray, step_m: floa
     noise = (one.variance[:, lag:] + one.variance[:, :-lag]) * (1 - alike[:, None])
     seen = np.isfinite(moved) & np.isfinite(noise)
     known = np.count_nonzero(seen, axis=1)
-    power, spoilt = (np.where(seen, each, 0.0).sum(axis=1) / np.maximum(known, 1) for each in (moved**2, noise))
-    power = np.maximum(power - spoilt, np.where(correlation_samples > 1, AT_LEAST * power, -np.inf))
+    power, moving = (
+        np.where(seen, each, 0.0).sum(axis=1) / np.maximum(known, 1) for each in (moved**2 - noise, moved**2)
+    )
+    power = np.where(correlation_samples > 1, np.maximum(power, AT_LEAST * moving), power)
     return np.where(known < LEAST_SAMPLES, np.nan, power / (lag * step_m) ** 2)
 
 
