@@ -119,7 +119,7 @@ def _one_direction(place_m, variance, lateral, gains, listening, own, out, error
 
 
 def likeness(apart: IntArray, correlation_samples: float) -> FloatArray:
-    """Return how alike errors of readings are that lie so many samples apart, −1 … 1.
+    """Return how alike errors of readings are that lie so many samples apart, 0 … 1.
 
     1 for the same reading, and nothing beyond where errors are independent (`correlation_samples` of 1). Else a Gaussian, as of
     readings that were averaged over their neighbours; its sum over all distances is `correlation_samples`.
@@ -159,7 +159,7 @@ def bend_powers(
     *,
     listened: Direction,
     step_m: float,
-    correlation_samples: float = 1.0,
+    correlation_samples: float,
 ) -> FloatArray:
     """Return the variances of the bends of one stretch in both directions, lateral first.
 
@@ -181,7 +181,7 @@ def bend_powers(
     Returns
     -------
     float64 array, shape (2,)
-        Below zero by chance when silent, NaN when hardly seen.
+        Below zero by chance when silent, but for errors that neighbours share (`AT_LEAST`); NaN when hardly seen.
     """
     lag = max(int(np.rint(BEND_M / step_m)), 1)
     noise = bend_noise(lag, correlation_samples) * variance
@@ -219,7 +219,10 @@ def bend_power(place_m, variance, lag, at_least=0.0):  # type: ignore[no-untyped
 
 
 def slope_power(one: OneDirection, correlation_samples: FloatArray, step_m: float) -> FloatArray:
-    """Return the mean square of the slopes of each stretch over `BEND_M`; below zero by chance when silent, or NaN."""
+    """Return the mean square of the slopes of each stretch over `BEND_M`; NaN where hardly anything was seen.
+
+    Below zero by chance when silent, but for errors that neighbours share (`AT_LEAST`).
+    """
     lag = max(int(np.rint(BEND_M / step_m)), 1)
     moved = one.place_m[:, lag:] - one.place_m[:, :-lag]
     alike = np.array([likeness(np.array(lag), shared) for shared in correlation_samples])

@@ -59,7 +59,8 @@ CLOSE = 3
 CALLED_FOR = 3
 """Lines of the cache that are called for with each vector of `ROWS` rows: by the time that they are needed all have come."""
 SEAMS = 4
-"""Of a row: lanes whose point to the west is the last but one of its stretch, lanes that have none; the same of the east."""
+"""Of a row: lanes that give the next lane the last point but one, for they share the last one; lanes with none to the west;
+lanes that give the lane before their second point; lanes with none to the east."""
 
 
 def _whole(number: int) -> Value:
@@ -95,7 +96,7 @@ def _sweep(w: LaneWriter) -> None:
         for k in range(CALLED_FOR):
             w.call_for(room, w.plus(line, k * LANES))
 
-        def beside(at: Value, here_: Value) -> tuple[Value, Value]:
+        def beside(at: Value, own: Value) -> tuple[Value, Value]:
             """The vectors of the points to the west and to the east."""
             a, e = (w.load(room, w.plus(at, place)) for place in (west, east))
             if not ends:
@@ -107,8 +108,8 @@ def _sweep(w: LaneWriter) -> None:
             before, after = b.select(second_west, before, a), b.select(second_east, after, e)
             across = w.cut(before, before, LANES - 1), w.cut(after, after, 1)
             return (
-                b.select(first, b.select(no_west, here_, across[0]), a),
-                b.select(last, b.select(no_east, here_, across[1]), e),
+                b.select(first, b.select(no_west, own, across[0]), a),
+                b.select(last, b.select(no_east, own, across[1]), e),
             )
 
         def row(far: Value) -> list[Value]:
