@@ -151,15 +151,15 @@ def track_09(path: Path) -> list[str]:
         ),
         "|" + "---|" * 4,
     ]
-    for pitch_um, angle_deg in (*((scale, 45.0) for scale in SCALES_UM), (4.0, 51.0)):
-        heard, speeds = heard_tones(path, pitch_um, angle_deg, periods)
+    for pitch_um, angle_deg in (*((scale, None) for scale in SCALES_UM), (4.0, 45.0)):
+        heard, speeds, taken_deg = heard_tones(path, pitch_um, angle_deg, periods)
         # a wall's own velocity along its normal, where it stands at 45°
         share = np.abs(heard[:, (0, 1), (0, 1)]).mean(axis=0) / (np.array([outer, inner]) * speeds)
         rows.append(
             line_of(
                 (
                     f"{pitch_um:g} µm" + (" (assumed)" if pitch_um == 4 else ""),
-                    f"{angle_deg:g}°",
+                    f"{taken_deg:.1f}°, " + ("by their tones" if angle_deg is None else "as was said"),
                     f"{share[0]:.2f}, {share[1]:.2f}",
                     _decibels(above_db(heard, np.ones(2))).replace(" and", ","),
                 )
@@ -168,14 +168,21 @@ def track_09(path: Path) -> list[str]:
     return [*rows, ""]
 
 
-def heard_tones(path: Path, pitch_um: float, angle_deg: float, periods_px: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return complex velocities of both tones, shape (groove, wall, tone), and the velocity of a pixel's swing at each."""
-    disc = Disc(cut="stereo", wall_angle_rad=rad(angle_deg))
-    capture = open_picture(path, StillManifest((), disc=disc, pixel_pitch_m=pitch_um / MICROMETRES_PER_METRE))
+def heard_tones(
+    path: Path, pitch_um: float, angle_deg: float | None, periods_px: FloatArray
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return velocities of both tones, shape (groove, wall, tone), of a pixel's swing at each, and the angle of the walls."""
+    disc = Disc(cut="stereo") if angle_deg is None else Disc(cut="stereo", wall_angle_rad=rad(angle_deg))
+    known = StillManifest(
+        (), disc=disc, wall_angle_known=angle_deg is not None, pixel_pitch_m=pitch_um / MICROMETRES_PER_METRE
+    )
+    capture = open_picture(path, known)
     pitch_m = capture.bench.sensor.pixel_pitch_m
     tones_hz = float(capture.bench.rotation.speed_at_m_s(0.0)) / (periods_px * pitch_m)
     with tempfile.TemporaryDirectory() as folder:
-        play(capture, load_recipe("stills"), Path(folder), Settings(rate_hz=RATE_HZ, full_scale_m_s=FULL_SCALE_M_S))
+        report = play(
+            capture, load_recipe("stills"), Path(folder), Settings(rate_hz=RATE_HZ, full_scale_m_s=FULL_SCALE_M_S)
+        )
         sound = FULL_SCALE_M_S * soundfile.read(Path(folder) / "walls.wav")[0]
         rows = list(csv.DictReader((Path(folder) / "grooves.csv").read_text("utf-8").splitlines()))
     found = []
@@ -188,7 +195,8 @@ def heard_tones(path: Path, pitch_um: float, angle_deg: float, periods_px: Float
             design = np.column_stack([turning.real, turning.imag, time_s**0, time_s]) * window
             fit = np.linalg.lstsq(design, piece * window, rcond=None)[0]
             found.append((fit[:2] - 1j * fit[2:4]).T)
-    return np.array(found), 2 * np.pi * tones_hz * pitch_m / np.sqrt(2)
+    taken_deg = report["calibration"]["wall_angle_deg"]["taken"]
+    return np.array(found), 2 * np.pi * tones_hz * pitch_m / np.sqrt(2), taken_deg
 
 
 def _decibels(both: FloatArray) -> str:

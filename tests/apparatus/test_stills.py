@@ -53,7 +53,7 @@ number = st.floats(1e-6, 900, allow_nan=False, allow_subnormal=False)
     pitch_um=st.none() | number,
     rpm=st.none() | number,
     radius_mm=st.none() | number,
-    angle=st.floats(0.01, 1.55),
+    angle=st.none() | st.floats(0.01, 1.55),
     axis=st.sampled_from([None, "columns", "rows"]),
     across=st.sampled_from([None, "inward", "outward"]),
     bits=st.none() | st.integers(8, 16),
@@ -65,7 +65,8 @@ def test_a_manifest_comes_back_to_the_last_bit(
 ) -> None:
     manifest = StillManifest(
         pictures=("a.png", "ü b.tif"),
-        disc=Disc("stereo", 77e-6, angle, "500N-16", {"title": 'a "b"', "date": "1911"}),
+        disc=Disc("stereo", 77e-6, np.pi / 4 if angle is None else angle, "500N-16", {"title": 'a "b"', "date": "1911"}),
+        wall_angle_known=angle is not None,
         pixel_pitch_m=None if pitch_um is None else pitch_um / 1e6,
         rpm=rpm,
         radius_m=None if radius_mm is None else radius_mm / 1e3,

@@ -59,6 +59,10 @@ def test_what_is_known_is_no_assumption(gramoscope: Callable[..., Any], picture:
     assert report["speed"]["rpm"] == report["speed"]["capture_rpm"] == pytest.approx(100 / 3)
     assert report["bench"]["rotation"]["radius_m"] == pytest.approx(0.0925)
     assert report["bench"]["disc"]["wall_angle_rad"] == pytest.approx(np.deg2rad(51.5))
+    angle = report["calibration"]["wall_angle_deg"]
+    assert angle["manifest"] == angle["taken"] == pytest.approx(51.5)
+    assert angle["by_test_tones"] is None
+    assert angle["reason"]
     assert report["seconds"] == pytest.approx(899 * 4e-6 / (2 * np.pi * 100 / 180 * 0.0925), abs=1e-4)
     assert [row["groove"] for row in report["grooves"]["played"]] == [2]
 

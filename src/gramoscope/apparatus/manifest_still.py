@@ -32,6 +32,8 @@ class StillManifest:
     pictures : tuple of str
         Files inside the capture's folder, in the order of the groove.
     disc : Disc
+    wall_angle_known : bool
+        Whether somebody says that the walls stand as `disc` has it. If not, test tones may tell (`pickup.edges.wall_angle`).
     pixel_pitch_m, rpm, radius_m : float or None
         None where nobody knows.
     bits : int or None
@@ -47,6 +49,7 @@ class StillManifest:
 
     pictures: tuple[str, ...]
     disc: Disc = field(default_factory=Disc)
+    wall_angle_known: bool = False
     pixel_pitch_m: float | None = None
     rpm: float | None = None
     radius_m: float | None = None
@@ -104,7 +107,7 @@ def _require_picture(name: str) -> None:
 
 def _manifest_of(content: StillFile) -> StillManifest:
     disc, camera, sequence = content.disc, content.camera, content.sequence
-    count = len(sequence.pictures)
+    count, angle_deg = len(sequence.pictures), disc.wall_angle_deg
     if (sequence.step_px is None) != (count == 1):
         raise ArgumentError(
             f"[sequence] has {count} pictures and {'no step_px' if sequence.step_px is None else 'a step_px'}",
@@ -115,10 +118,11 @@ def _manifest_of(content: StillFile) -> StillManifest:
         disc=Disc(
             cut=disc.cut,
             groove_width_m=si_of(disc.groove_width_um, MICRO),
-            wall_angle_rad=rad_of(disc.wall_angle_deg),
+            wall_angle_rad=Disc().wall_angle_rad if angle_deg is None else rad_of(angle_deg),
             characteristic=disc.characteristic,
             notes={name: text for name in NOTES if (text := getattr(disc, name)) is not None},
         ),
+        wall_angle_known=angle_deg is not None,
         pixel_pitch_m=_si(camera.pixel_pitch_um, MICRO),
         rpm=_si(disc.rpm, 0),
         radius_m=_si(disc.radius_mm, MILLI),
@@ -160,7 +164,7 @@ def write_still_manifest(path: Path, manifest: StillManifest) -> None:
 
 def _file_of(manifest: StillManifest) -> dict[str, Any]:
     disc, row = manifest.disc, manifest.row
-    degrees = deg_of(disc.wall_angle_rad)
+    degrees = deg_of(disc.wall_angle_rad) if manifest.wall_angle_known else None
     return without_none(
         {
             "format": FORMAT,

@@ -17,7 +17,7 @@ class StillDiscTable(Table):
     rpm: Number | None = Field(default=None, gt=0, le=1000)
     radius_mm: Number | None = Field(default=None, gt=0, le=1000)
     groove_width_um: Number = Field(default=Decimal(150), gt=0, le=10_000)
-    wall_angle_deg: Number = Field(default=Decimal(45), gt=0, lt=90)
+    wall_angle_deg: Number | None = Field(default=None, gt=0, lt=90)
     characteristic: str | None = Field(default=None, min_length=1)
     title: Note = None
     performer: Note = None

@@ -38,7 +38,8 @@ class PictureOptions:
         Of a picture: direction of the sound.
     wall_angle_deg
         Of a picture: angle of each wall against the land. It says how far edges move apart when the groove gets deeper, and so
-        which part of their motion goes to which channel of a stereo record.
+        which part of their motion goes to which channel of a stereo record. When left out, test tones tell it where each wall
+        has its own; else it is 45.
     """
 
     pixel_pitch_um: Annotated[float | None, FINITE] = None
@@ -48,7 +49,7 @@ class PictureOptions:
     across: Literal["inward", "outward"] | None = None
     turn_px: Annotated[float | None, FINITE] = None
     cut: Literal["lateral", "vertical", "stereo"] = "lateral"
-    wall_angle_deg: Annotated[float, FINITE] = 45.0
+    wall_angle_deg: Annotated[float | None, FINITE] = None
 
     def manifest(self, rpm: str | None = None) -> StillManifest:
         """Return what is known, in SI units."""
@@ -61,10 +62,12 @@ class PictureOptions:
 
         for name, value in (("--pixel-pitch-um", self.pixel_pitch_um), ("--radius-mm", self.radius_mm)):
             require(value is None or value > 0, f"{name} {value}", "a positive length")
-        require(0 < self.wall_angle_deg < 90, f"--wall-angle-deg {self.wall_angle_deg:g}", "above 0, below 90")
+        angle_deg = self.wall_angle_deg
+        require(angle_deg is None or 0 < angle_deg < 90, f"--wall-angle-deg {angle_deg}", "above 0, below 90")
         return StillManifest(
             pictures=(),
-            disc=Disc(cut=self.cut, wall_angle_rad=rad(self.wall_angle_deg)),
+            disc=Disc(cut=self.cut) if angle_deg is None else Disc(cut=self.cut, wall_angle_rad=rad(angle_deg)),
+            wall_angle_known=angle_deg is not None,
             pixel_pitch_m=None if self.pixel_pitch_um is None else self.pixel_pitch_um / MICROMETRES_PER_METRE,
             rpm=None if rpm is None else speed_called(rpm).rpm,
             radius_m=None if self.radius_mm is None else self.radius_mm / MILLIMETRES_PER_METRE,

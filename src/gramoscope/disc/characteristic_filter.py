@@ -21,8 +21,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal
 
-from gramoscope.conventions import FloatArray
-from gramoscope.disc.characteristics import Characteristic, ComplexArray
+from gramoscope.conventions import ComplexArray, FloatArray
+from gramoscope.disc.characteristics import Characteristic
 from gramoscope.errors import require
 
 AUDIO_BAND_HZ = (20.0, 20_000.0)

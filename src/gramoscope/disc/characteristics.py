@@ -29,9 +29,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from gramoscope.conventions import ComplexArray
 from gramoscope.errors import ArgumentError, require
-
-ComplexArray = npt.NDArray[np.complex128]
 
 REFERENCE_HZ = 1000.0
 """Every response is 0 dB here."""

@@ -8,13 +8,11 @@ backwards, 1 / (1 + (f₁/f)⁸) · 1 / (1 + (f/f₂)⁸), so that each edge fre
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 import scipy.fft
 
-from gramoscope.conventions import FloatArray
+from gramoscope.conventions import ComplexArray, FloatArray
 
 Band = tuple[float, float]
-ComplexArray = npt.NDArray[np.complex128]
 
 _ORDER = 4
 _REFINEMENTS = 12

@@ -53,6 +53,7 @@ def _of_pickup(calibration: Mapping[str, Any]) -> Iterator[Row]:
     for key, found, what, unit in (
         ("focus_shift_um", "if_walls_are_as_stated", "depth between the two planes, if the walls are as stated", "µm"),
         ("wall_angle_deg", "if_the_glass_is_as_stated", "angle of the walls, if the glass is as stated", "°"),
+        ("wall_angle_deg", "by_test_tones", "angle of the walls, by their test tones", "°"),
     ):
         told = calibration.get(key, {})
         yield what, unit, told.get("manifest"), told.get(found)

@@ -74,6 +74,11 @@ class FilmReading:
         return self.pickup.calibration
 
     @property
+    def wall_angle_rad(self) -> float:
+        """As the manifest says."""
+        return self.capture.bench.disc.wall_angle_rad
+
+    @property
     def length_m(self) -> float:
         """As the manifest says."""
         return self.capture.bench.passage_length_m

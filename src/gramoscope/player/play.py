@@ -174,7 +174,7 @@ def play(
         _outputs(capture, recipe, folder, settings) as files,
         _begun(capture, recipe, folder, settings, files, work or Work(), progress) as reading,
     ):
-        tonearm = Tonearm(resampler.rotation, direction, bench.disc.wall_angle_rad, reading.length_m, recipe.smoother)
+        tonearm = Tonearm(resampler.rotation, direction, reading.wall_angle_rad, reading.length_m, recipe.smoother)
         monitor = _monitor(capture, tonearm, resampler)
 
         def played(passage: Passage) -> Iterator[GrooveSound]:

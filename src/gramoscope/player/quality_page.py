@@ -227,7 +227,7 @@ def _calibration(report: Report) -> str:
         for row in report["calibration_check"]
     ]
     head = ("quantity", "manifest", "film", "difference", "verdict")
-    told = table(head, rows) if rows else paragraph("The recipe measures nothing of the apparatus.")
+    told = table(head, rows) if rows else paragraph("Nothing that is stated of the apparatus was measured.")
     return section("calibration", "The apparatus: manifest and film", told)
 
 

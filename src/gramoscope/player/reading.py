@@ -54,6 +54,11 @@ class Reading(Protocol):
         ...
 
     @property
+    def wall_angle_rad(self) -> float:
+        """φ of both walls, by which their motion is taken for sideways and up and down."""
+        ...
+
+    @property
     def hashes(self) -> InputHashes:
         """Sums of what was read."""
         ...

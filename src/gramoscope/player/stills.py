@@ -28,6 +28,7 @@ from gramoscope.player.outputs import EDGES, GROOVE_LABELS, GROOVES
 from gramoscope.player.provenance import InputHashes, hash_group
 from gramoscope.player.reading import Passage
 from gramoscope.player.row_of_pictures import Looked, RowOfPictures, Stretch
+from gramoscope.player.wall_angle import WallAngle, wall_angle_of
 from gramoscope.player.workers import in_order
 from gramoscope.quality import NOT_MEASURED, Quality
 from gramoscope.signal_path import GrooveEdges, StillPicture, WallTrace
@@ -91,6 +92,8 @@ class StillReading:
     files : Outputs
     edges_path : Path
     rate_hz : float
+    angle : WallAngle or None
+        Of the walls, once the edges have been found.
     """
 
     capture: StillCapture
@@ -104,8 +107,9 @@ class StillReading:
     hashes: InputHashes = field(default_factory=InputHashes)
     centring: Centring = field(default_factory=Centring)
 
+    angle: WallAngle | None = None
+
     walls = ("outer", "inner")
-    calibration: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def begun(
@@ -121,8 +125,10 @@ class StillReading:
         row, cartridge = RowOfPictures(capture.bench, recipe.stitch), recipe.edge_cartridge()
         reading = cls(capture, row, [], {}, {}, files, files.beside(EDGES), settings.rate_hz)
         reading._look(cartridge, settings.workers, progress)
-        reading._sort_out(settings.groove)
-        return replace(reading, centring=Centring(settings.speed.remove_wow))
+        passages = reading._sort_out(settings.groove)
+        disc, known = capture.bench.disc, capture.manifest.wall_angle_known
+        angle = wall_angle_of(disc.wall_angle_rad, known, passages, reading._edges)
+        return replace(reading, centring=Centring(settings.speed.remove_wow), angle=angle)
 
     def _look(self, cartridge: EdgeCartridge, workers: int, progress: Told | None) -> None:
         def look(number: int) -> tuple[StillPicture, tuple[GrooveEdges, ...], Looked, dict[str, str]]:
@@ -142,8 +148,8 @@ class StillReading:
                 if progress is not None:
                     progress(picture.number + 1, count, "Looking")
 
-    def _sort_out(self, groove: int | None) -> None:
-        """Turn what was seen into passages; one of them alone if somebody asked for it."""
+    def _sort_out(self, groove: int | None) -> list[tuple[Stretch, ...]]:
+        """Turn what was seen into passages, one of them alone to be played if somebody asked for it; return all of them."""
         passages = self.row.passages()
         if not passages:
             raise CaptureError(
@@ -163,9 +169,20 @@ class StillReading:
                 length_m = last.arc_start_m + (last.columns - 1) * pitch_m
                 turns = sum(one.picture == stretches[0].picture for one in stretches)
                 self.grooves.append(PlayedGroove(number, stretches, turns, length_m))
+        return passages
 
     def _first_problem(self) -> str:
         return f"; the first problem: {next(iter(self.problems.values()))[0]}" if self.problems else ""
+
+    @property
+    def calibration(self) -> Mapping[str, Any]:
+        """At which angle the walls stand."""
+        return {} if self.angle is None else self.angle.as_dict()
+
+    @property
+    def wall_angle_rad(self) -> float:
+        """As somebody says, as test tones tell, or 45°."""
+        return self.capture.bench.disc.wall_angle_rad if self.angle is None else self.angle.rad
 
     @property
     def length_m(self) -> float:
@@ -189,8 +206,11 @@ class StillReading:
             monitor.picked_up(trace, 0)
             yield trace
 
+    def _edges(self, stretch: Stretch) -> GrooveEdges:
+        return read_edges(self.edges_path, stretch.picture, stretch.groove)
+
     def _trace(self, stretch: Stretch) -> WallTrace:
-        edges = read_edges(self.edges_path, stretch.picture, stretch.groove)
+        edges = self._edges(stretch)
         picture = StillPicture(
             number=stretch.picture,
             image=_nothing(stretch.columns),
@@ -256,6 +276,8 @@ class StillReading:
 
     def remarks(self) -> Iterator[str]:
         """Say what nobody knows of the scale, and which way the groove was taken to run."""
+        if self.angle is not None:
+            yield from self.angle.remarks()
         bench = self.capture.bench
         if bench.assumed:
             yield (

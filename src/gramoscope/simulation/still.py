@@ -261,6 +261,7 @@ def write_still(folder: Path, scene: StillScene, passage: Passage, *, pictures: 
     manifest = StillManifest(
         pictures=tuple(names),
         disc=scene.disc,
+        wall_angle_known=True,
         pixel_pitch_m=scene.pixel_pitch_m,
         rpm=scene.rpm,
         groove_along="columns",
