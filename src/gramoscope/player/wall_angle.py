@@ -68,11 +68,14 @@ class WallAngle:
         """Say what was done, if anything was."""
         if self.told:
             inner, outer = self.found.period_px
-            crosstalk, angle_deg, sigma_deg = np.mean(self.found.crosstalk), *np.rad2deg((self.rad, self.found.sigma_rad))
+            share, angle_deg, sigma_deg = (
+                np.mean(self.found.crosstalk),
+                *np.rad2deg((self.rad, self.found.sigma_rad)),
+            )
             yield (
                 f"walls were taken to stand at {angle_deg:.1f} ± {sigma_deg:.1f}°: each has a tone of its own (periods of "
                 f"{outer:.1f} pixels on the outer wall, {inner:.1f} on the inner one), and both tones "
-                f"move the other edge too, by {crosstalk:.3f} of their swing, as they do at that angle; to take nothing off, say "
+                f"move the other edge too, by {share:.3f} of their swing, as they do then; to take nothing off, say "
                 "that walls stand at 45° (--wall-angle-deg 45, or wall_angle_deg in capture.toml)"
             )
 

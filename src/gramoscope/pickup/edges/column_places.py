@@ -36,8 +36,6 @@ NOISE_COLUMNS = 20.0
 """Standard deviation of the window, in columns, over which the strength of the noise is averaged."""
 LEAST_NOISE = 1e-3
 """Noise is never taken for less than this share of the range of grey levels in the band."""
-NARROW = 11
-"""In bands of no more rows a neighbouring edge shows too: its motion is no error that pixels share, and each counts alone."""
 FLAT = 0.2
 """Share of the steepest gradient below which a profile counts as flat."""
 
@@ -71,7 +69,7 @@ class ColumnPlaces:
 
 
 def column_places(
-    band: EdgeBand, profile: EdgeProfile, kept: BoolArray, *, dust_gate: float, settled: bool
+    band: EdgeBand, profile: EdgeProfile, kept: BoolArray, *, dust_gate: float, settled: bool, crowded: bool = False
 ) -> ColumnPlaces:
     """Return what every column says of the place of its edge.
 
@@ -86,17 +84,19 @@ def column_places(
     settled : bool
         Whether the course follows the edge already: then the noise is judged on the course. Judged after each column's
         step it is too small, for the step takes along what neighbouring pixels share.
+    crowded : bool
+        Whether a neighbouring edge shows in the band: its motion is no error that pixels share, and each counts alone.
     """
     rest = band.level - profile.expected
     halo = band.halo * np.maximum(band.burnt_level - profile.expected, 0.0)
     noise = _first_noise(band, rest, kept)
-    steps = _steps(rest, halo, profile, noise, kept, settled=settled)
+    steps = _steps(rest, halo, profile, noise, kept, settled=settled, crowded=crowded)
     for _ in range(2):
         own = noise * steps.own(kept)
         dust = band.usable & (np.abs(own) > dust_gate * noise)
         kept = band.usable & ~binary_dilation(dust, np.ones((3, 3), np.bool_))
         noise = _noise(band, rest if settled else own, 0.0 if settled else profile.gradient, noise, kept)
-        steps = _steps(rest, halo, profile, noise, kept, settled=settled)
+        steps = _steps(rest, halo, profile, noise, kept, settled=settled, crowded=crowded)
     # the step has taken noise along where the profile is steep; likeness is judged where it is not, and beside no halo
     flat = np.abs(profile.gradient) < FLAT * np.abs(profile.gradient).max()
     beside = np.where(flat & kept & (halo < FAINT * noise), steps.grain(kept), 0.0)
@@ -104,7 +104,7 @@ def column_places(
     if not settled:
         errors = errors + toeplitz(likeness(beside.T, rest.shape[1])) - np.eye(rest.shape[1])
     variance = steps.variance(errors)
-    if rest.shape[1] > NARROW:
+    if not crowded:
         variance = variance * _strangeness(steps.after, kept, steps.covariance)
     return ColumnPlaces(steps.step, np.where(steps.gain > 0, variance, np.inf), steps.lost, likeness(beside), kept)
 
@@ -142,7 +142,14 @@ class _Steps:
 
 
 def _steps(
-    rest: FloatArray, halo: FloatArray, profile: EdgeProfile, noise: FloatArray, kept: BoolArray, *, settled: bool
+    rest: FloatArray,
+    halo: FloatArray,
+    profile: EdgeProfile,
+    noise: FloatArray,
+    kept: BoolArray,
+    *,
+    settled: bool,
+    crowded: bool,
 ) -> _Steps:
     """The step of each column, by generalised least squares (`column_noise`); specks that are kept pull little."""
     clear = profile.gradient / noise
@@ -151,7 +158,7 @@ def _steps(
     place = np.arange(rest.shape[1]) - (rest.shape[1] - 1) / 2
     bright = np.mean(profile.light[:, None] / noise, axis=0)
     patterns = bright[:, None] * patch_patterns(place, SOFT_STEP_PX)
-    if rest.shape[1] <= NARROW:
+    if crowded:
         # the next edge lies within: nothing is known to be land or wall as a whole
         covariance, patterns = np.eye(rest.shape[1]), np.zeros((rest.shape[1], 1))
     elif settled:

@@ -31,6 +31,8 @@ EDGES_A_PITCH, SPARE_COURSES = 4, 8
 """Courses that are looked for: twice as many as there are edges, and some."""
 HALF_BAND_SHARE, HALF_BAND_PX = 1 / 16, (5, 14)
 """Rows on each side of an edge that are looked at, as a share of the pitch, and their limits."""
+CROWDED_PX = 14.0
+"""A neighbouring edge that is nearer than this shows in those rows, or its blur does."""
 
 
 @dataclass(frozen=True)
@@ -85,9 +87,10 @@ class EdgeCartridge:
         low, high = HALF_BAND_PX
         half_px = int(np.clip(round(HALF_BAND_SHARE * pitch_px), low, high))
         halo = learn_halo(picture, burnt)
+        all_courses = [edge for groove in grooves for edge in (groove.outer, groove.inner) if edge is not None]
         found = list[GrooveEdges]()
         for groove in grooves:
-            sharp = self._sharpened(picture, groove, half_px, burnt, halo)
+            sharp = self._sharpened(picture, groove, half_px, burnt, halo, all_courses)
             if any(edge is not None for edge in sharp):
                 edges = _groove_edges(len(found), sharp, columns)
                 found.append(self._with_bottom(edges, picture, half_px, burnt))
@@ -125,7 +128,13 @@ class EdgeCartridge:
         return choose_grooves(courses, pitch_px=pitch_px, lines=self.appearance is Appearance.BRIGHT_LINES)
 
     def _sharpened(
-        self, picture: StillPicture, groove: CoarseGroove, half_px: int, burnt: int, halo: Halo
+        self,
+        picture: StillPicture,
+        groove: CoarseGroove,
+        half_px: int,
+        burnt: int,
+        halo: Halo,
+        all_courses: list[Course],
     ) -> tuple[SharpEdge | None, SharpEdge | None]:
         """The edges of one groove, `INNER` first."""
 
@@ -134,13 +143,27 @@ class EdgeCartridge:
                 return None
             line = self.appearance is Appearance.BRIGHT_LINES
             edge = self.sharpening.sharpen(
-                picture, course.row, wall=course.wall, half_px=half_px, burnt=burnt, halo=halo, line=line
+                picture,
+                course.row,
+                wall=course.wall,
+                half_px=half_px,
+                burnt=burnt,
+                halo=halo,
+                line=line,
+                crowded=_nearest_px(course, all_courses) < CROWDED_PX,
             )
             if edge is None or np.mean((edge.flags & np.uint16(NOT_MEASURED)) == 0) < self.least_seen:
                 return None
             return edge
 
         return sharp(groove.inner), sharp(groove.outer)
+
+
+def _nearest_px(course: Course, courses: list[Course]) -> float:
+    """How far a course is from the nearest of the others, in the median of its columns."""
+    return min(
+        (float(np.median(np.abs(course.row - other.row))) for other in courses if other is not course), default=np.inf
+    )
 
 
 def _edge_count(grooves: list[CoarseGroove]) -> int:

@@ -120,6 +120,7 @@ class Sharpening:
         burnt: int,
         halo: Halo = NO_HALO,
         line: bool = False,
+        crowded: bool = False,
     ) -> SharpEdge | None:
         """Return the place of an edge in every column.
 
@@ -138,6 +139,8 @@ class Sharpening:
             How far what is burnt brightens its surroundings.
         line : bool
             Whether it is a lone line, with the same on both sides; then its place is that of the line.
+        crowded : bool
+            Whether a neighbouring edge shows in the rows that are looked at.
 
         Returns
         -------
@@ -154,7 +157,8 @@ class Sharpening:
             band = edge_band(picture, settled.row, wall=wall, half_px=half_px, burnt=burnt, halo=halo)
             # where nothing is measured yet the coarse course leads, so that it can be found again
             leading = guide if number < self.rounds - 1 else None
-            seen = self._look(band, settled, kept, inside, leading, line=line, gated=number >= self.rounds // 2)
+            gated = number >= self.rounds // 2
+            seen = self._look(band, settled, kept, inside, leading, line=line, crowded=crowded, gated=gated)
             if seen is None:
                 return None
             kept, settled = seen.places.kept, seen.settled
@@ -169,11 +173,14 @@ class Sharpening:
         guide: FloatArray | None,
         *,
         line: bool,
+        crowded: bool,
         gated: bool,
     ) -> _Round | None:
         """One round: profile, places, course; None when hardly anything is measured."""
         profile = learn_profile(band, band.usable if kept is None else kept & band.usable, line=line)
-        places = column_places(band, profile, band.usable, dust_gate=self.dust_gate, settled=guide is None)
+        places = column_places(
+            band, profile, band.usable, dust_gate=self.dust_gate, settled=guide is None, crowded=crowded
+        )
         step = np.clip(places.step, -GREATEST_STEP_PX, GREATEST_STEP_PX)
         # a column that leaves its edge anywhere in the band says nothing
         seen = inside & (places.lost < self.most_lost) & (places.variance < (0.25 * band.level.shape[1]) ** 2)
