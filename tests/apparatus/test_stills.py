@@ -65,7 +65,9 @@ def test_a_manifest_comes_back_to_the_last_bit(
 ) -> None:
     manifest = StillManifest(
         pictures=("a.png", "ü b.tif"),
-        disc=Disc("stereo", 77e-6, np.pi / 4 if angle is None else angle, "500N-16", {"title": 'a "b"', "date": "1911"}),
+        disc=Disc(
+            "stereo", 77e-6, np.pi / 4 if angle is None else angle, "500N-16", {"title": 'a "b"', "date": "1911"}
+        ),
         wall_angle_known=angle is not None,
         pixel_pitch_m=None if pitch_um is None else pitch_um / 1e6,
         rpm=rpm,

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
+from gramoscope.errors import ArgumentError
 from gramoscope.pickup.edges.steady_course import ORDER, left_by_course, steady_course
 
 
@@ -58,6 +59,21 @@ def test_a_gap_is_bridged_with_a_larger_error() -> None:
     course = steady_course(row, weight)
     assert course.variance[205] > 4 * course.variance[100]
     assert (np.abs(course.row - true)[190:220] < 4 * np.sqrt(course.variance[190:220])).all()
+
+
+def test_a_stiff_course_is_softened_where_a_wide_gap_leaves_nothing_to_solve() -> None:
+    rng = np.random.default_rng(11)
+    row, weight = 0.02 * np.arange(2000.0) + 0.5 * rng.standard_normal(2000), np.zeros(2000)
+    weight[:760] = 0.25
+    found = steady_course(row, weight, stiffness=1e9)
+    assert np.isfinite(found.row).all()
+    assert np.isfinite(found.variance).all()
+    assert found.stiffness < 1e9
+    assert np.abs(found.row - 0.02 * np.arange(2000.0))[:760].max() < 0.3
+    assert found.variance[1900] > 100 * found.variance[400]
+    weight[10] = -1.0
+    with pytest.raises(ArgumentError, match="no course"):
+        steady_course(row, weight, stiffness=1.0)
 
 
 @pytest.mark.parametrize(("blur", "stiffness"), [(0.0, 3.0), (0.0, 1e4), (1.0, 30.0), (2.0, 1e3)])

@@ -16,6 +16,7 @@ diagonal (Takahashi's recursion). A gap has w = 0: it is bridged, and its varian
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numba
@@ -24,6 +25,7 @@ from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 from scipy.optimize import minimize_scalar
 
 from gramoscope.conventions import FloatArray
+from gramoscope.errors import ArgumentError
 
 ORDER = 3
 STIFFNESS_DECADES = (-3.0, 7.0)
@@ -31,6 +33,9 @@ IMPOSSIBLE = 1e12
 """κ over the median weight: between places that are followed one by one and a parabola."""
 FEWEST_PLACES = 8
 WAVES = 513
+MOST_TENS = 16
+Solution = tuple[FloatArray, FloatArray, float]
+"""Factor, course and misfit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +92,7 @@ def steady_course(row: FloatArray, weight: FloatArray, *, stiffness: float | Non
     weight : float64 array, shape (column,)
         Inverse variance of each place; at least `FEWEST_PLACES` above 0.
     stiffness : float, optional
-        κ; by the greatest marginal likelihood when left out.
+        κ; by the greatest marginal likelihood when left out. Softer by tens where a wide gap leaves nothing to solve.
 
     Returns
     -------
@@ -101,7 +106,7 @@ def steady_course(row: FloatArray, weight: FloatArray, *, stiffness: float | Non
     scale = float(np.median(weight[weight > 0]))
     free = max(int(np.count_nonzero(weight)) - ORDER, 1)
 
-    def solved(stiffness: float) -> tuple[FloatArray, FloatArray, float]:
+    def solved(stiffness: float) -> Solution:
         matrix = stiffness * roughness
         matrix[0] += weight
         factor = cholesky_banded(matrix, lower=True, check_finite=False)
@@ -123,8 +128,18 @@ def steady_course(row: FloatArray, weight: FloatArray, *, stiffness: float | Non
     if stiffness is None:
         best = minimize_scalar(surprise, bounds=STIFFNESS_DECADES, method="bounded", options={"xatol": 0.1})
         stiffness = scale * 10 ** float(best.x)
-    factor, course, misfit = solved(stiffness)
+    stiffness, (factor, course, misfit) = _softened(solved, stiffness)
     return SteadyCourse(course + origin, _inverse_diagonal(factor) * max(1.0, misfit / free), stiffness)
+
+
+def _softened(solved: Callable[[float], Solution], stiffness: float) -> tuple[float, Solution]:
+    """Solve with a stiffness, or with the first tenth, hundredth … of it that can be solved."""
+    for softer in 10.0 ** -np.arange(MOST_TENS):
+        try:
+            return softer * stiffness, solved(softer * stiffness)
+        except LinAlgError:
+            pass
+    raise ArgumentError("places and weights of which no course can be made", "numbers, and weights of 0 or more")
 
 
 def left_by_course(likeness: FloatArray, weight: float, stiffness: float) -> float:
