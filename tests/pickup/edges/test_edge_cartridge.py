@@ -82,8 +82,13 @@ def test_noise_that_neighbours_share_makes_larger_errors(photograph: Make, scene
     )
 
 
-def test_a_wall_that_shines_by_turns_moves_no_edge(photograph: Make, picture_of: Make) -> None:
-    drawn = photograph(columns=600, swing_px=0.0, noise=4.0, line=20.0)
+@pytest.mark.parametrize(("pitch_px", "width_px"), [(100.0, 60.0), (60.0, 36.0)])
+def test_a_wall_that_shines_by_turns_moves_no_edge(
+    photograph: Make, picture_of: Make, pitch_px: float, width_px: float
+) -> None:
+    # at the smaller one five rows on each side of an edge are looked at, and its neighbours are far away still
+    scene = {"pitch_px": pitch_px, "width_px": width_px, "rows": round(3 * pitch_px)}
+    drawn = photograph(columns=600, swing_px=0.0, noise=4.0, line=20.0, **scene)
     row, column = np.mgrid[: drawn.rows, : drawn.columns]
     bands = 25.0 * np.sin(2 * np.pi * column / 40)
     walls = sum(ndtr(row - edge[OUTER]) - ndtr(row - edge[INNER]) for edge in drawn.edges())

@@ -95,6 +95,20 @@ def test_800_hz_on_one_wall_and_3000_hz_on_the_other(micrograph: Make, picture_o
         assert abs(np.angle(leak)) < 0.6
 
 
+def test_a_smaller_picture_holds_the_same_tones(micrograph: Make, picture_of: Make) -> None:
+    scale = 0.6
+    grooves = CARTRIDGE.find(picture_of(_resized(micrograph("track_09"), scale)))
+    whole = [groove for groove in grooves if np.isfinite(groove.row_px).any(axis=1).all()]
+    assert len(whole) == 6
+    rates = 1 / (154.5 * scale), 1 / (40.5 * scale)
+    outer, inner = ([_fit(_places(groove, wall), *rates) for groove in whole] for wall in (OUTER, INNER))
+    assert min(explained for _, explained in inner) > 0.75
+    # a tenth of the slow tone on the inner wall, a third of a pixel: five rows on each side of an edge tell it, too
+    leaks = [tones[0] / other[0] for (tones, _), (other, _) in zip(inner, outer, strict=True)]
+    assert 0.05 < np.mean(leaks).real < 0.12
+    assert abs(np.mean(leaks).imag) < 0.04
+
+
 def test_the_line_along_the_bottom_is_found_where_it_is_seen_and_swings_as_the_walls_do(
     micrograph: Make, picture_of: Make
 ) -> None:

@@ -29,10 +29,10 @@ BLOCK_SHARE, CORRIDOR_SHARE, MARGIN_SHARE = 1 / 40, 0.06, 0.4
 """Of the pitch: a block of columns, the corridor that an edge has to itself, and how far courses may leave the picture."""
 EDGES_A_PITCH, SPARE_COURSES = 4, 8
 """Courses that are looked for: twice as many as there are edges, and some."""
-HALF_BAND_SHARE, HALF_BAND_PX = 1 / 16, (5, 14)
+HALF_BAND_SHARE, HALF_BAND_PX = 1 / 16, (6, 14)
 """Rows on each side of an edge that are looked at, as a share of the pitch, and their limits."""
-CROWDED_PX = 14.0
-"""A neighbouring edge that is nearer than this shows in those rows, or its blur does."""
+CROWDED_PX, CROWDED_HALF_BAND_PX = 14.0, 5
+"""Where a neighbouring edge is nearer than this it shows in those rows, or its blur does; then fewer are looked at."""
 
 
 @dataclass(frozen=True)
@@ -142,15 +142,16 @@ class EdgeCartridge:
             if course is None:
                 return None
             line = self.appearance is Appearance.BRIGHT_LINES
+            crowded = _nearest_px(course, all_courses) < CROWDED_PX
             edge = self.sharpening.sharpen(
                 picture,
                 course.row,
                 wall=course.wall,
-                half_px=half_px,
+                half_px=min(half_px, CROWDED_HALF_BAND_PX) if crowded else half_px,
                 burnt=burnt,
                 halo=halo,
                 line=line,
-                crowded=_nearest_px(course, all_courses) < CROWDED_PX,
+                crowded=crowded,
             )
             if edge is None or np.mean((edge.flags & np.uint16(NOT_MEASURED)) == 0) < self.least_seen:
                 return None
