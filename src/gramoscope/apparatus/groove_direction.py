@@ -19,7 +19,8 @@ from gramoscope.signal_path import ImageArray
 
 STRIPS = 4
 """A strip is so many times shorter than the shorter side, or grooves would swing out of their own mean."""
-SCALES_PX = (1.0, 2.0, 4.0, 8.0)
+LEAST_SCALES, LARGEST_SCALE = 4, 1 / 32
+"""Scales of 1, 2, 4 … pixels: at least so many, and up to this share of the shorter side."""
 CLIPPED = (5, 90)
 """Per cent of the pixels."""
 LONGEST_PX = 2048
@@ -69,5 +70,6 @@ def _steepness(image: FloatArray, length: int) -> FloatArray:
     """Mean square slope of what is steady along the columns, by scale: the median over strips of so many columns."""
     strips = np.array_split(image, max(image.shape[1] // length, 1), axis=1)
     means = np.array([strip.mean(axis=1) for strip in strips])
-    slopes = (np.diff(gaussian_filter1d(means, scale, axis=1)) for scale in SCALES_PX)
+    scales = 2.0 ** np.arange(max(LEAST_SCALES, int(np.log2(max(min(image.shape) * LARGEST_SCALE, 1))) + 1))
+    slopes = (np.diff(gaussian_filter1d(means, scale, axis=1)) for scale in scales)
     return np.array([np.median((slope**2).mean(axis=1)) for slope in slopes])

@@ -2,7 +2,8 @@
 
 First coarsely: how far apart grooves are (`groove_pitch`), what speaks for an edge at each place (`step_evidence`), the
 paths that collect most of it (`courses`) and which of them are the edges of grooves (`groove_choice`). Then each edge on
-its own, to a fraction of a pixel (`sharpening`), and the line along the bottom where there is one (`bottom_line`).
+its own, to a fraction of a pixel (`sharpening`), and the line along the bottom where there is one (`bottom_line`). Where
+grooves are hundreds of pixels apart pixels are binned first (`binning`).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from gramoscope.conventions import INNER, OUTER
 from gramoscope.errors import require
 from gramoscope.pickup.edges.appearance import Appearance
+from gramoscope.pickup.edges.binning import binned_picture, binning_factor, unbinned
 from gramoscope.pickup.edges.bottom_line import bottom_line
 from gramoscope.pickup.edges.courses import Course, find_courses
 from gramoscope.pickup.edges.groove_choice import CoarseGroove, choose_grooves
@@ -84,6 +86,11 @@ class EdgeCartridge:
             return ()
         burnt = burnt_level(picture, self.burnt_share)
         grooves, pitch_px = self.coarse(picture, burnt)
+        factor = binning_factor(pitch_px, columns)
+        if factor > 1:
+            return tuple(
+                unbinned(edges, factor, columns) for edges in self.find(binned_picture(picture, factor, burnt))
+            )
         low, high = HALF_BAND_PX
         half_px = int(np.clip(round(HALF_BAND_SHARE * pitch_px), low, high))
         halo = learn_halo(picture, burnt)

@@ -25,8 +25,9 @@ from gramoscope.conventions import INNER, OUTER, BoolArray, ComplexArray, FloatA
 from gramoscope.quality import NOT_MEASURED
 from gramoscope.signal_path import GrooveEdges
 
-MOST_COLUMNS = 2048
-"""Of a stretch, about its middle: over more, a hole that is off the centre smears a tone."""
+MOST_COLUMNS, MOST_WIDTHS = 2048, 30
+"""Of a stretch, about its middle: so many columns, or widths of the groove if that is more. Over longer ones a hole that is off
+the centre smears a tone."""
 LEAST_MEASURED = 0.6
 """An edge of which less was measured says nothing."""
 LEAST_STRETCHES = 3
@@ -175,9 +176,13 @@ def _by_crosstalk(
 def _pair(groove: GrooveEdges) -> tuple[_Edge, _Edge] | None:
     """Both edges of the middle of a stretch; None if one of them was hardly measured."""
     columns = groove.flags.shape[1]
-    first = max(columns - MOST_COLUMNS, 0) // 2
-    middle = slice(first, first + MOST_COLUMNS)
-    measured = (groove.flags[:, middle] & np.uint16(NOT_MEASURED)) == 0
+    seen = (groove.flags & np.uint16(NOT_MEASURED)) == 0
+    both = seen.all(axis=0)
+    width_px = float(np.median(np.abs(np.diff(groove.row_px[:, both], axis=0)))) if both.any() else 0.0
+    most = max(MOST_COLUMNS, round(MOST_WIDTHS * width_px))
+    first = max(columns - most, 0) // 2
+    middle = slice(first, first + most)
+    measured = seen[:, middle]
     if measured.mean(axis=1).min() < LEAST_MEASURED:
         return None
     row, sigma = groove.row_px[:, middle], groove.row_sigma_px[:, middle]
