@@ -87,7 +87,7 @@ def test_a_wall_that_shines_by_turns_moves_no_edge(
     photograph: Make, picture_of: Make, pitch_px: float, width_px: float
 ) -> None:
     # at the smaller one five rows on each side of an edge are looked at, and its neighbours are far away still
-    scene = {"pitch_px": pitch_px, "width_px": width_px, "rows": round(3 * pitch_px)}
+    scene = {"pitch_px": pitch_px, "width_px": width_px, "rows": round(3 * pitch_px + 10)}
     drawn = photograph(columns=600, swing_px=0.0, noise=4.0, line=20.0, **scene)
     row, column = np.mgrid[: drawn.rows, : drawn.columns]
     bands = 25.0 * np.sin(2 * np.pi * column / 40)
@@ -113,6 +113,26 @@ def test_a_wall_that_shines_by_turns_makes_no_error_larger(photograph: Make, pic
     for groove, other in zip(grooves, calm, strict=True):
         assert groove.correlation_samples < 1.2 * other.correlation_samples
     assert 0.88 < np.sqrt(np.mean(_pulls(grooves, drawn.edges()) ** 2)) < 1.15
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        {"blur_px": 0.6, "noise": 2.0},
+        {"blur_px": 0.7, "noise": 1.0, "swing_px": 5.7, "period_px": 44.8, "seed": 2},
+        {"blur_px": 1.0, "noise": 1.0, "swing_px": 6.7, "period_px": 78.7, "seed": 8},
+        {"blur_px": 1.3, "noise": 4.0, "swing_px": 5.5, "period_px": 43.3, "seed": 13, "line": 30.0},
+    ],
+)
+def test_loud_and_clean_edges_are_not_lost(photograph: Make, scene: dict[str, float]) -> None:
+    # from its coarse course alone one of six was lost in each of these: 2 to 3 pixels off, and claimed to be known to 0.2
+    drawn = photograph(**scene)
+    grooves = CARTRIDGE.find(drawn.still())
+    assert len(grooves) == 3
+    for groove, true in zip(grooves, drawn.edges(), strict=True):
+        assert _measured(groove).mean() > 0.98
+        assert (groove.row_px - true).std(axis=1).max() < 0.12
+    assert np.sqrt(np.mean(_pulls(grooves, drawn.edges()) ** 2)) < 1.2
 
 
 def test_columns_keep_to_themselves_when_told_so(photograph: Make) -> None:

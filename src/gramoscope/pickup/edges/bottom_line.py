@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from gramoscope.conventions import INNER, OUTER, FloatArray
 from gramoscope.pickup.edges.edge_band import EdgeBand, edge_band
-from gramoscope.pickup.edges.sharpening import Sharpening
+from gramoscope.pickup.edges.sharpening import Reach, Sharpening
 from gramoscope.quality import NOT_MEASURED
 from gramoscope.signal_path import StillPicture
 
@@ -61,7 +61,7 @@ def bottom_line(
     if aside is None:
         return nothing
     half_px = min(half_px, reach)
-    found = sharpening.sharpen(picture, middle + aside, wall=INNER, half_px=half_px, burnt=burnt, line=True)
+    found = sharpening.sharpen(picture, middle + aside, wall=INNER, reach=Reach(half_px), burnt=burnt, line=True)
     if found is None:
         return nothing
     seen = (found.flags & np.uint16(NOT_MEASURED)) == 0

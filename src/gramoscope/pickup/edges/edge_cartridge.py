@@ -21,7 +21,7 @@ from gramoscope.pickup.edges.courses import Course, find_courses
 from gramoscope.pickup.edges.groove_choice import CoarseGroove, choose_grooves
 from gramoscope.pickup.edges.groove_pitch import groove_pitches_px
 from gramoscope.pickup.edges.halo import Halo, learn_halo
-from gramoscope.pickup.edges.sharpening import SharpEdge, Sharpening
+from gramoscope.pickup.edges.sharpening import Reach, SharpEdge, Sharpening
 from gramoscope.pickup.edges.step_evidence import block_means, burnt_level, step_evidence
 from gramoscope.quality import NOT_MEASURED, Quality, no_flags
 from gramoscope.signal_path import GrooveEdges, StillPicture
@@ -35,6 +35,8 @@ HALF_BAND_SHARE, HALF_BAND_PX = 1 / 16, (6, 14)
 """Rows on each side of an edge that are looked at, as a share of the pitch, and their limits."""
 CROWDED_PX, CROWDED_HALF_BAND_PX = 14.0, 5
 """Where a neighbouring edge is nearer than this it shows in those rows, or its blur does; then fewer are looked at."""
+WIDE = 2
+"""So many times the rows are looked at to see whether an edge is where it was found, as far as no neighbour is there."""
 
 
 @dataclass(frozen=True)
@@ -149,16 +151,9 @@ class EdgeCartridge:
             if course is None:
                 return None
             line = self.appearance is Appearance.BRIGHT_LINES
-            crowded = _nearest_px(course, all_courses) < CROWDED_PX
+            reach = _reach(course, all_courses, half_px)
             edge = self.sharpening.sharpen(
-                picture,
-                course.row,
-                wall=course.wall,
-                half_px=min(half_px, CROWDED_HALF_BAND_PX) if crowded else half_px,
-                burnt=burnt,
-                halo=halo,
-                line=line,
-                crowded=crowded,
+                picture, course.row, wall=course.wall, reach=reach, burnt=burnt, halo=halo, line=line
             )
             if edge is None or np.mean((edge.flags & np.uint16(NOT_MEASURED)) == 0) < self.least_seen:
                 return None
@@ -167,11 +162,13 @@ class EdgeCartridge:
         return sharp(groove.inner), sharp(groove.outer)
 
 
-def _nearest_px(course: Course, courses: list[Course]) -> float:
-    """How far a course is from the nearest of the others, in the median of its columns."""
-    return min(
-        (float(np.median(np.abs(course.row - other.row))) for other in courses if other is not course), default=np.inf
-    )
+def _reach(course: Course, courses: list[Course], half_px: int) -> Reach:
+    """Which rows beside a course are looked at, by the nearest of the others: that in the median of its columns."""
+    others = (float(np.median(np.abs(course.row - other.row))) for other in courses if other is not course)
+    nearest_px = min(others, default=np.inf)
+    if nearest_px < CROWDED_PX:
+        return Reach(min(half_px, CROWDED_HALF_BAND_PX), crowded=True)
+    return Reach(half_px, int(min(WIDE * half_px, nearest_px - half_px)))
 
 
 def _edge_count(grooves: list[CoarseGroove]) -> int:
