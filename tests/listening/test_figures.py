@@ -89,6 +89,23 @@ def test_every_stripe_has_a_colour_of_its_own_and_a_name() -> None:
     assert len({to_hex(line.get_color()) for line in above.lines[:6:2]}) == 3
 
 
+def test_edges_of_all_grooves_have_the_colours_of_those_that_the_legend_names() -> None:
+    names = ("inner edge", "outer edge", "_inner edge of groove 2", "_outer edge of groove 2")
+    lines = [_stripe(20.0 + 15 * number)._replace(name=name) for number, name in enumerate(names)]
+    figure = groove_figure(
+        np.zeros((HEIGHT_PX, WIDTH_PX), np.uint8),
+        white_level=255,
+        pixel_pitch_m=PITCH_M,
+        stripes=lines,
+        glass_edge_row=None,
+        waveform=_waveform(700),
+        title="a photograph",
+    )
+    colours = [to_hex(line.get_color()) for line in figure.axes[0].lines[:8:2]]
+    assert colours[:2] == colours[2:]
+    assert colours[0] != colours[1]
+
+
 def test_a_groove_without_stripes_or_glass_is_drawn_all_the_same(tmp_path: Path) -> None:
     save_png(_groove(stripes=0, glass_edge_row=None), tmp_path / "groove.png")
     assert _groove(stripes=0, glass_edge_row=None).axes[0].get_legend() is None

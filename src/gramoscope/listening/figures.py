@@ -121,7 +121,7 @@ def groove_figure(
     figure.suptitle(title, x=0.012, ha="left", fontsize=ink.LARGE, color=ink.BLACK)
     above, below = figure.subplots(2, 1, height_ratios=[height_in, 3.0])
     _draw_frame(above, image, white_level=white_level, pixel_pitch_m=pixel_pitch_m)
-    for line, colour in zip(stripes, _cycled(len(stripes)), strict=True):
+    for line, colour in zip(stripes, _colours([line[0] for line in stripes]), strict=True):
         _draw_stripe(above, StripeLine(*line), colour=colour, height_px=image.shape[0], pixel_pitch_m=pixel_pitch_m)
     if glass_edge_row is not None:
         _draw_glass_edge(above, float(_lateral_um(glass_edge_row, image.shape[0], pixel_pitch_m)))
@@ -144,14 +144,16 @@ def frame_figure(
     along_in = ink.MARGINS_IN["bottom"] + ink.MARGINS_IN["top"]
     figure, (axes,) = ink.small_figure(width_in, across_in * image.shape[0] / image.shape[1] + along_in, 1.0)
     _draw_frame(axes, image, white_level=white_level, pixel_pitch_m=pixel_pitch_m)
-    for line, colour in zip(stripes, _cycled(len(stripes)), strict=True):
+    for line, colour in zip(stripes, _colours([line[0] for line in stripes]), strict=True):
         _draw_stripe(axes, StripeLine(*line), colour=colour, height_px=image.shape[0], pixel_pitch_m=pixel_pitch_m)
     ink.dress(axes, x="along the groove (µm)", y="across (µm)", grid=False)
     return figure
 
 
-def _cycled(count: int) -> list[str]:
-    return [STRIPE_COLOURS[number % len(STRIPE_COLOURS)] for number in range(count)]
+def _colours(names: Sequence[str]) -> list[str]:
+    """One for each kind of line; those that the legend does not name follow in the order of those that it does."""
+    kinds = sum(not name.startswith("_") for name in names) or len(names)
+    return [STRIPE_COLOURS[number % min(kinds, len(STRIPE_COLOURS))] for number in range(len(names))]
 
 
 def _lateral_um(row: npt.ArrayLike, height_px: int, pixel_pitch_m: float) -> FloatArray:
