@@ -16,6 +16,7 @@ from gramoscope.errors import ArgumentError
 from gramoscope.pickup.edges.appearance import Appearance
 from gramoscope.pickup.edges.edge_cartridge import EdgeCartridge
 from gramoscope.pickup.edges.sharpening import Sharpening
+from gramoscope.pickup.edges.step_evidence import burnt_level
 from gramoscope.quality import NOT_MEASURED, Quality
 from gramoscope.signal_path import GrooveEdges
 
@@ -272,6 +273,21 @@ def test_there_is_no_groove_in_noise(picture_of: Make) -> None:
     assert CARTRIDGE.find(picture_of(np.full((300, 400), 80, np.uint8))) == ()
     assert CARTRIDGE.find(picture_of(np.full((5, 400), 80, np.uint8))) == ()
     assert CARTRIDGE.find(picture_of(np.full((300, 400), 255, np.uint8))) == ()
+
+
+def test_what_is_burnt_is_what_piles_up_at_the_top(picture_of: Make) -> None:
+    rng = np.random.default_rng(2)
+    grain = np.clip(rng.normal(90, 20, (200, 300)), 0, 160).astype(np.uint8)
+    dusty = grain.copy()
+    dusty[50:60, 100:120] = 180
+    assert burnt_level(picture_of(grain), 0.98) == 250
+    assert burnt_level(picture_of(dusty), 0.98) == 177
+    # land without any noise is no dust, and a picture that reaches full scale has its own
+    dusty[:, :150] = 180
+    assert burnt_level(picture_of(dusty), 0.98) == 250
+    dusty[0, 0] = 255
+    assert burnt_level(picture_of(dusty), 0.98) == 250
+    assert burnt_level(picture_of(np.zeros((20, 20), np.uint8)), 0.98) == 250
 
 
 @pytest.mark.parametrize("wrong", [{"steepest": 0.0}, {"burnt_share": 0.0}, {"least_seen": 2.0}])

@@ -134,6 +134,18 @@ def test_writing_and_dust_at_full_scale_get_no_weight(micrograph: Make, picture_
             assert np.mean(image[np.rint(row).astype(int), column.astype(int)] == 255) < 0.005
 
 
+@pytest.mark.parametrize("name", ["track_05", "track_09"])
+def test_dust_gets_no_weight_in_a_picture_that_was_darkened(micrograph: Make, picture_of: Make, name: str) -> None:
+    image = micrograph(name)
+    bright, dark = (CARTRIDGE.find(picture_of(one)) for one in (image, (0.7 * image).astype(np.uint8)))
+    assert len(bright) == len(dark)
+    for here, there in zip(bright, dark, strict=True):
+        both = (here.flags == 0) & (there.flags == 0)
+        assert np.mean(both == (here.flags == 0)) > 0.93
+        off = (there.row_px - here.row_px)[both]
+        assert np.sqrt(np.mean(off**2)) < 0.4
+
+
 def _resized(image: np.ndarray, scale: float) -> np.ndarray:  # type: ignore[type-arg]
     height, width = image.shape
     return np.asarray(

@@ -30,6 +30,10 @@ FEWEST_PIXELS = 0.5
 """A mean over less than this share of its pixels is not believed."""
 SAMPLE_PIXELS = 1 << 20
 """Medians over a picture rest on so many pixels at most, evenly spread."""
+TOP = 0.98
+"""The highest fiftieth of all values."""
+PILED_UP, LEAST_BURNT, MOST_BURNT = 5.0, 1e-3, 0.15
+"""Times as many pixels in it as in the next, and shares of all pixels, of a picture whose dust is burnt."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +54,19 @@ class StepEvidence:
 
 
 def burnt_level(picture: StillPicture, burnt_share: float) -> int:
-    """Return the pixel value from which on a pixel counts as burnt."""
-    return max(1, int(np.ceil(burnt_share * picture.white_level)))
+    """Return the pixel value from which on a pixel counts as burnt: a share of full scale, or of what full scale has become.
+
+    In a picture that was darkened after it was taken burnt pixels pile up at the highest value that there is, `PILED_UP` times
+    as many as just below. They are few: a land without any noise is no dust.
+    """
+    sample: npt.NDArray[np.uint16] = spread_sample(picture.image).astype(np.uint16)
+    white_level, top = picture.white_level, int(sample.max())
+    if top < burnt_share * white_level:
+        highest = float(np.mean(sample > TOP * top))
+        below = float(np.mean(sample > (2 * TOP - 1) * top)) - highest
+        if MOST_BURNT > highest > max(PILED_UP * below, LEAST_BURNT):
+            white_level = top
+    return max(1, int(np.ceil(burnt_share * white_level)))
 
 
 def spread_sample(values: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
