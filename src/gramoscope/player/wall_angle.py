@@ -67,16 +67,13 @@ class WallAngle:
     def remarks(self) -> Iterator[str]:
         """Say what was done, if anything was."""
         if self.told:
-            inner, outer = self.found.period_px
-            share, angle_deg, sigma_deg = (
-                np.mean(self.found.crosstalk),
-                *np.rad2deg((self.rad, self.found.sigma_rad)),
-            )
+            inner_px, outer_px = self.found.period_px
+            angle_deg, sigma_deg = np.rad2deg((self.rad, self.found.sigma_rad))
             yield (
                 f"walls were taken to stand at {angle_deg:.1f} ± {sigma_deg:.1f}°: each has a tone of its own (periods of "
-                f"{outer:.1f} pixels on the outer wall, {inner:.1f} on the inner one), and both tones "
-                f"move the other edge too, by {share:.3f} of their swing, as they do then; to take nothing off, say "
-                "that walls stand at 45° (--wall-angle-deg 45, or wall_angle_deg in capture.toml)"
+                f"{outer_px:.1f} pixels on the outer wall, {inner_px:.1f} on the inner one), and both tones move the other "
+                f"edge, too, by {np.mean(self.found.crosstalk):.3f} of their swing, as they do at that angle; to take nothing "
+                "off, say that walls stand at 45° (--wall-angle-deg 45, or wall_angle_deg in capture.toml)"
             )
 
 

@@ -17,7 +17,13 @@ COLUMNS, NOISE_PX = 600, 0.6
 
 
 def groove(
-    inner: np.ndarray, outer: np.ndarray, *, angle_deg: float, rng: np.random.Generator, number: int = 0
+    inner: np.ndarray,  # type: ignore[type-arg]
+    outer: np.ndarray,  # type: ignore[type-arg]
+    *,
+    angle_deg: float,
+    rng: np.random.Generator,
+    number: int = 0,
+    noise_px: float = NOISE_PX,
 ) -> GrooveEdges:
     """Edges of a groove whose walls were moved along their normals, by so many pixels, where walls of 45° are moved so."""
     lateral, rise = (outer + inner) / np.sqrt(2), (outer - inner) / np.sqrt(2)
@@ -26,7 +32,7 @@ def groove(
     spiral = 0.01 * np.arange(columns) + 1e-5 * np.arange(columns) ** 2
     rows = np.empty((2, columns))
     rows[INNER], rows[OUTER] = 40 + spiral + lateral - rise * cot, 80 + spiral + lateral + rise * cot
-    rows += NOISE_PX * rng.standard_normal(rows.shape)
+    rows += noise_px * rng.standard_normal(rows.shape)
     nothing = np.full(columns, np.nan)
     flags = np.zeros(rows.shape, np.uint16)
     return GrooveEdges(number, rows, np.full(rows.shape, NOISE_PX), 1.0, flags, nothing, nothing)
@@ -128,6 +134,19 @@ def test_a_tone_on_one_wall_alone_tells_nothing() -> None:
     # what is seen of it on the other wall is the tone itself
     assert nothing_told(wall_angle(of_tones(angle_deg=55.0, swing_px=(0, 8))), "same tone")
     assert nothing_told(wall_angle(of_tones(angle_deg=45.0, swing_px=(0, 8))), "stands out on the inner wall")
+
+
+def test_edges_without_any_noise_tell_it_too() -> None:
+    time = np.arange(COLUMNS)
+    rng = np.random.default_rng(4)
+    grooves = []
+    for number in range(3):
+        phases = rng.random(2)
+        inner, outer = (
+            np.sin(2 * np.pi * (time / period + phase)) for period, phase in zip((30, 75), phases, strict=True)
+        )
+        grooves.append(groove(3 * inner, 8 * outer, angle_deg=49.0, rng=rng, number=number, noise_px=0.0))
+    assert np.rad2deg(wall_angle(grooves).angle_rad) == pytest.approx(49.0, abs=0.05)
 
 
 def test_music_tells_nothing() -> None:

@@ -43,6 +43,7 @@ LEAST_EXPLAINED = 0.5
 SIGMAS = 3.0
 STEP_SLACK, CROSSTALK_SLACK = 0.03, 0.02
 """Crosstalk so small, or so alike, is not held against the tones: edges are read no better than that."""
+LEAST_SCATTER_PX = 1e-6
 LEAST_SIGMA = 0.002
 """Of crosstalk: a few stretches may agree by chance."""
 MOST_CROSSTALK = 0.27
@@ -157,8 +158,9 @@ def _by_crosstalk(
     if explained.min() < LEAST_EXPLAINED:
         return WallAngleFinding(**told, reason=f"there is more than a tone on each wall (R² {explained.min():.2f})")
     # each tone's share in what the other edge's scatter lets it tell
-    own = np.stack([swing[:, wall, wall] for wall in (INNER, OUTER)], axis=1) / np.sqrt(squares[::-1, 1])
-    other = np.stack([swing[:, 1 - wall, wall] for wall in (INNER, OUTER)], axis=1) / np.sqrt(squares[::-1, 1])
+    scatter_px = np.sqrt(np.maximum(squares[::-1, 1], LEAST_SCATTER_PX**2))
+    own = np.stack([swing[:, wall, wall] for wall in (INNER, OUTER)], axis=1) / scatter_px
+    other = np.stack([swing[:, 1 - wall, wall] for wall in (INNER, OUTER)], axis=1) / scatter_px
     crosstalk, sigma = np.array([_crosstalk(own[:, [wall]], other[:, [wall]]) for wall in (INNER, OUTER)]).T
     told |= {"crosstalk": _two(crosstalk.real), "crosstalk_sigma": _two(sigma.real)}
     out_of_step = np.abs(crosstalk.imag) > np.maximum(np.abs(crosstalk.real), STEP_SLACK) + SIGMAS * sigma.imag
