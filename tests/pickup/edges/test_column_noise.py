@@ -72,6 +72,20 @@ def test_a_pixel_that_is_not_kept_is_as_if_it_were_not_there() -> None:
     assert not found[2].any()
 
 
+def test_any_pixels_may_be_left_out() -> None:
+    rng = np.random.default_rng(RNG_SEED)
+    root = rng.normal(size=(19, 19))
+    covariance = root @ root.T + 0.02 * np.eye(19)
+    kept = rng.random((200, 19)) > rng.random((200, 1))
+    gradient = rng.normal(size=(200, 19))
+    found = filtered(covariance, kept, gradient)
+    for column, mine in enumerate(kept):
+        alone = np.linalg.solve(covariance[np.ix_(mine, mine)], gradient[column, mine])
+        np.testing.assert_allclose(found[column, mine], alone, rtol=1e-6, atol=1e-8)
+        assert not found[column, ~mine].any()
+    np.testing.assert_array_equal(filtered(np.eye(19), kept, gradient), np.where(kept, gradient, 0.0))
+
+
 def test_a_covariance_is_seen_as_it_is() -> None:
     rng = np.random.default_rng(RNG_SEED)
     noise = gaussian_filter1d(rng.normal(size=(40_000, 25)), 1.0, axis=1)[:, 5:20]

@@ -17,6 +17,7 @@ Everything is in units of the noise of each pixel.
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 from scipy.linalg import toeplitz
 from scipy.special import ndtr
@@ -59,19 +60,57 @@ def filtered(covariance: FloatArray, kept: BoolArray, gradient: FloatArray) -> F
     kept : bool array, shape (column, place)
     gradient : float64 array, shape (column, place)
     """
+    found = np.where(kept, gradient, 0.0)
     if np.array_equal(covariance, np.eye(covariance.shape[0])):
-        return np.where(kept, gradient, 0.0)
-    found = np.zeros_like(gradient)
-    whole = kept.all(axis=1)
-    if whole.any():
-        found[whole] = np.linalg.solve(covariance, gradient[whole].T).T
-    some = np.flatnonzero(~whole & kept.any(axis=1))
-    if some.size:
-        mine = kept[some]
-        # those that are not kept stand apart, with no gradient
-        matrix = np.where(mine[:, :, None] & mine[:, None, :], covariance, np.eye(covariance.shape[0]))
-        found[some] = np.linalg.solve(matrix, (gradient[some] * mine)[..., None])[..., 0]
+        return found
+    inverse = np.linalg.inv(covariance)
+    found = np.asarray(found @ inverse, np.float64)
+    leave_out(inverse, kept, found)
     return found
+
+
+@numba.njit(cache=True, nogil=True)
+def leave_out(inverse, kept, found):  # type: ignore[no-untyped-def]
+    """Make Σ⁻¹ g, by all pixels, what it is by those that are kept, in place.
+
+    With P = Σ⁻¹, y = P g, where g is 0 at d, the pixels that are left out: the others have y − P_·d (P_dd)⁻¹ y_d. `inverse` is
+    P, symmetric, shape (place, place); `kept` and `found` have the shape (column, place).
+    """
+    columns, places = found.shape
+    out = np.empty(places, np.int64)
+    factor = np.empty((places, places))
+    for c in range(columns):
+        count = 0
+        for i in range(places):
+            if not kept[c, i]:
+                out[count] = i
+                count += 1
+        if count == places:
+            found[c] = 0.0
+            continue
+        # Cholesky's factor, and both triangles solved; y_d becomes the solution
+        for i in range(count):
+            for j in range(i + 1):
+                total = inverse[out[i], out[j]]
+                for k in range(j):
+                    total -= factor[i, k] * factor[j, k]
+                factor[i, j] = np.sqrt(total) if i == j else total / factor[j, j]
+            total = found[c, out[i]]
+            for k in range(i):
+                total -= factor[i, k] * found[c, out[k]]
+            found[c, out[i]] = total / factor[i, i]
+        for i in range(count - 1, -1, -1):
+            total = found[c, out[i]]
+            for k in range(i + 1, count):
+                total -= factor[k, i] * found[c, out[k]]
+            found[c, out[i]] = total / factor[i, i]
+        for k in range(count):
+            share = found[c, out[k]]
+            for i in range(places):
+                if kept[c, i]:
+                    found[c, i] -= inverse[i, out[k]] * share
+        for k in range(count):
+            found[c, out[k]] = 0.0
 
 
 def seen_covariance(rest: FloatArray, kept: BoolArray) -> FloatArray:
