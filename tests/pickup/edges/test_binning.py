@@ -116,3 +116,15 @@ def test_errors_are_true_in_large_pictures(photograph: Make, scene: dict[str, fl
         pulls.append((off - off.mean(axis=1, keepdims=True)) / groove.row_sigma_px)
     # without binning errors were five to fourteen times the claimed ones, where the blur is wide
     assert 0.8 < np.sqrt(np.mean(np.square(pulls))) < 1.2
+
+
+@pytest.mark.parametrize("blur_px", [2.0, 5.2])
+def test_large_pictures_without_noise_have_edges_too(photograph: Make, blur_px: float) -> None:
+    drawn = photograph(
+        columns=800, rows=600, pitch_px=200.0, first_px=40.0, width_px=120.0, noise=0.0, swing_px=6.0, blur_px=blur_px
+    )
+    grooves = CARTRIDGE.find(drawn.still())
+    assert len(grooves) == 3
+    for groove, true in zip(grooves, drawn.edges(), strict=True):
+        assert np.mean(groove.flags == 0) > 0.9
+        assert (groove.row_px - true).std(axis=1).max() < 0.05

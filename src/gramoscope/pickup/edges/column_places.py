@@ -34,7 +34,7 @@ from gramoscope.pickup.edges.likeness import likeness
 
 NOISE_COLUMNS = 20.0
 """Standard deviation of the window, in columns, over which the strength of the noise is averaged."""
-LEAST_NOISE = 1e-3
+LEAST_NOISE = 5e-3
 """Noise is never taken for less than this share of the range of grey levels in the band."""
 FLAT = 0.2
 """Share of the steepest gradient below which a profile counts as flat."""
