@@ -118,10 +118,10 @@ def test_errors_are_true_in_large_pictures(photograph: Make, scene: dict[str, fl
     assert 0.8 < np.sqrt(np.mean(np.square(pulls))) < 1.2
 
 
-@pytest.mark.parametrize("blur_px", [2.0, 5.2])
-def test_large_pictures_without_noise_have_edges_too(photograph: Make, blur_px: float) -> None:
+@pytest.mark.parametrize(("blur_px", "noise"), [(2.0, 0.0), (5.2, 0.5)])
+def test_large_pictures_with_next_to_no_noise_have_edges_too(photograph: Make, blur_px: float, noise: float) -> None:
     drawn = photograph(
-        columns=800, rows=600, pitch_px=200.0, first_px=40.0, width_px=120.0, noise=0.0, swing_px=6.0, blur_px=blur_px
+        columns=800, rows=600, pitch_px=200.0, first_px=40.0, width_px=120.0, noise=noise, swing_px=6.0, blur_px=blur_px
     )
     grooves = CARTRIDGE.find(drawn.still())
     assert len(grooves) == 3
