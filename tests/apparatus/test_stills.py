@@ -83,6 +83,12 @@ def test_a_manifest_comes_back_to_the_last_bit(
     assert is_still(tmp_path)
 
 
+def test_an_unusual_angle_of_the_walls_is_not_lost_in_writing(tmp_path: Path) -> None:
+    manifest = StillManifest(("a.png",), disc=Disc(wall_angle_rad=0.9))
+    write_still_manifest(tmp_path / "capture.toml", manifest)
+    assert read_still_manifest(tmp_path) == replace(manifest, wall_angle_known=True)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

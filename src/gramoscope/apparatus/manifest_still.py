@@ -164,7 +164,9 @@ def write_still_manifest(path: Path, manifest: StillManifest) -> None:
 
 def _file_of(manifest: StillManifest) -> dict[str, Any]:
     disc, row = manifest.disc, manifest.row
-    degrees = deg_of(disc.wall_angle_rad) if manifest.wall_angle_known else None
+    # an angle that is not the usual one was put there by somebody, and is not lost
+    said = manifest.wall_angle_known or disc.wall_angle_rad != Disc().wall_angle_rad
+    degrees = deg_of(disc.wall_angle_rad) if said else None
     return without_none(
         {
             "format": FORMAT,
